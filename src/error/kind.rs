@@ -8,8 +8,8 @@ use thiserror::Error;
 use super::NoRows;
 use super::near::{is_it_rather, key_suggestion, pattern_suggestion, suggestion};
 use super::phrases::{
-    decimal_comma_hint, joined_list, near_quote, plural, stiffness_units, windows_path_hint,
-    with_remedy,
+    behind_camera_remedy, decimal_comma_hint, joined_list, near_quote, plural, stiffness_units,
+    windows_path_hint, with_remedy,
 };
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
@@ -218,11 +218,15 @@ pub enum InputErrorKind {
     #[error("{word} is no point of the marker, whose points are numbered from 0 to {last}")]
     NoSuchPoint { word: String, last: usize },
     #[error(
-        "the point is behind the camera; check the names and numbers of the row, whether points_mm \
-         counts the corners as the detector does (10 × 7 or 7 × 10), and the poses of camera and \
-         marker (at_m and rotation_deg), which views of one direction do not determine"
+        "the point is behind the camera; {}", behind_camera_remedy(*fits, *miss)
     )]
-    PointBehindCamera,
+    PointBehindCamera { fits: Option<bool>, miss: Option<f64> },
+    #[error(
+        "the points of the images fit no pose of the marker: they miss the nearest one by {declared:.1} px, \
+         and by {transposed:.1} px with corners along and across exchanged; declare points_mm as the \
+         detector counts them (a board of 10 × 7 instead of 7 × 10)"
+    )]
+    GridTransposed { declared: f64, transposed: f64 },
     #[error(
         "the views do not determine the poses of camera \"{camera}\" and marker \"{marker}\": {why}; \
          add such views, or declare at_m and rotation_deg of one of them"

@@ -126,6 +126,28 @@ pub(super) fn decimal_comma_remedy(found: usize, expected: usize) -> &'static st
     }
 }
 
+/// Returns the remedy for a point behind the camera. `fits` is true if the points of the images fit
+/// the marker by themselves, which they miss by `miss` \[px\].
+pub(super) fn behind_camera_remedy(fits: Option<bool>, miss: Option<f64>) -> String {
+    let miss = miss.filter(|miss| miss.is_finite());
+    let miss = miss.map_or_else(|| "far".to_owned(), |miss| format!("by {miss:.1} px"));
+    match fits {
+        Some(true) => "each image by itself fits the marker, so that lens and points are right; check \
+             units (radians under _deg?), signs and order of the joint columns, whether joints and images \
+             belong together, and at_m and rotation_deg of camera and marker"
+            .to_owned(),
+        Some(false) => format!(
+            "the points of the images fit no pose of the marker, which they miss {miss} without the \
+             arm; check focal_px and centre_px (in pixels, not in millimetres), points_mm, and the numbers \
+             in the column point"
+        ),
+        None => "check the names and numbers of the row, whether points_mm counts the corners as the \
+             detector does (10 × 7 or 7 × 10), and the poses of camera and marker (at_m and \
+             rotation_deg), which views of one direction do not determine"
+            .to_owned(),
+    }
+}
+
 /// Returns one key of each table, in parentheses, if no row shares a key: of the measurements, and
 /// of the joint table. Returns an empty text for `None`.
 pub(super) fn compared_keys(keys: Option<&[String; 2]>) -> String {

@@ -329,6 +329,11 @@ impl Model {
         point().unwrap_or_default()
     }
 
+    /// Returns the points of a marker, marker frame \[m\]; empty for other fixtures.
+    pub(crate) fn marker_points(&self, fixture: usize) -> &[Vector3<f64>] {
+        self.declared.get(fixture).map_or(&[], |fixture| &fixture.points)
+    }
+
     /// Returns the numbers of all points, anchors, surfaces, cameras and markers at `x`.
     pub(crate) fn fixtures(&self, x: &[f64]) -> Vec<FixtureValues<f64>> {
         let mut fixtures = self.fixtures.clone();

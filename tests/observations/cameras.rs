@@ -322,6 +322,20 @@ fn wrong_rows_are_named() {
     }
 }
 
+/// The images by themselves tell a mistake in the marker from one in the arm.
+#[test]
+fn a_grid_declared_along_its_other_side_is_named_before_the_fit() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let mut problem = Problem::read(&folder).unwrap();
+    let (data, _) = Dataset::read(&problem).unwrap();
+    problem.fixtures[1].points = (0..35)
+        .map(|k| Vector3::new(0.03 * f64::from(k % 5), 0.03 * f64::from(k / 5), 0.0))
+        .collect();
+    let error = identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
+    let expected = ["data.csv:", "fit no pose of the marker", "along and across exchanged"];
+    assert_contains(&error, &expected);
+}
+
 #[test]
 fn a_point_behind_the_camera_is_an_error_with_its_row() {
     let problem = problem(&CAMERAS.replace("at_m = [3, 0, 0.7]", "at_m = [-3, 0, 0.7]"));
@@ -518,6 +532,8 @@ fn next_images_show_the_board_as_the_measured_ones_do() {
     };
     let next = design::next(&problem, &data, &Candidates::Within(ranges), &options).unwrap();
     assert_eq!(next.poses.len(), 4);
+    // Poses are drawn until enough of them show the board.
+    assert!(next.candidates >= 200 && next.drawn.is_some_and(|drawn| drawn >= 20_000));
     let model = model_of(&problem, &rows);
     // Twice the area of the board in the image; its sign is that of the side that is seen.
     let view = |table: &Measurements, row: usize| {

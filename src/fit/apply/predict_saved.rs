@@ -228,7 +228,10 @@ pub fn predict(
             && errors[row].x.is_nan()
     };
     if let Some(row) = (0..rows.len()).find(is_behind) {
-        return Err(rows.location(row).error(InputErrorKind::PointBehindCamera).into());
+        return Err(rows
+            .location(row)
+            .error(InputErrorKind::PointBehindCamera { fits: None, miss: None })
+            .into());
     }
     let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));
     let of_row =

@@ -3,12 +3,11 @@
 
 use nalgebra::DVector;
 
-use crate::error::{InputError, InputErrorKind};
 use crate::fit::errors::of_kind;
 use crate::fit::stages::alternation::{Alternation, Anderson, contraction};
 use crate::fit::stages::custom_solver::CustomSolver;
 use crate::fit::stages::earlier_data::EarlierData;
-use crate::fit::stages::fixture_location::{locate, undecided_views};
+use crate::fit::stages::fixture_location::locate;
 use crate::fit::stages::gauge::Gauge;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::placement::HeldOutOnly;
@@ -22,7 +21,6 @@ use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose};
-use crate::observation::Needs;
 use crate::problem::Observation;
 use crate::quantity::Unit;
 
@@ -225,50 +223,6 @@ impl<'a> Fitting<'a> {
         let unknowns: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k]).collect();
         (!unknowns.is_empty())
             .then(|| Stage { counts_fixed: true, ..self.placement_stage(rows, unknowns) })
-    }
-
-    /// Returns an error about the first row that the nominal arm cannot predict, because its pose
-    /// has no equilibrium or a point is behind its camera. `None` if the nominal arm predicts every
-    /// row.
-    pub fn unpredictable(&self) -> Option<InputError> {
-        let is_of_camera = |row: &usize| {
-            let kind = self.measurements.observation(*row).description();
-            kind.needs == Needs::Carriers
-        };
-        let (of_cameras, others): (Vec<usize>, Vec<usize>) =
-            (0..self.measurements.len()).partition(is_of_camera);
-        let lost = |rows: &[usize], x: &DVector<f64>, kind| {
-            let errors = self.position_errors(rows, x);
-            let place = errors.iter().position(|error| error.x.is_nan())?;
-            Some(self.measurements.location(rows[place]).error(kind))
-        };
-        let x = DVector::zeros(self.model.parameters.len());
-        let behind = || {
-            let carriers = self.model.carrier_frames(&self.poses(&of_cameras), x.as_slice());
-            let place = carriers.iter().position(Option::is_none);
-            let kind = InputErrorKind::NoEquilibrium;
-            let lost_pose = place.map(|k| self.measurements.location(of_cameras[k]).error(kind));
-            let behind = InputErrorKind::PointBehindCamera;
-            lost_pose
-                .or_else(|| self.undecided(&of_cameras))
-                .or_else(|| lost(&of_cameras, &self.located(), behind))
-        };
-        lost(&others, &x, InputErrorKind::NoEquilibrium)
-            .or_else(|| if of_cameras.is_empty() { None } else { behind() })
-    }
-
-    /// Returns an error at the first row of a camera and a marker whose poses the views in `rows`
-    /// do not determine; `None` if they determine all of them.
-    fn undecided(&self, rows: &[usize]) -> Option<InputError> {
-        let x = DVector::zeros(self.model.parameters.len());
-        let ([camera, marker], why) = undecided_views(self.model, &self.poses(rows), &x)?;
-        let is_of_pair = |row: &&usize| {
-            self.measurements.observation(**row).fixtures() == [Some(camera), Some(marker)]
-        };
-        let row = *rows.iter().find(is_of_pair)?;
-        let [camera, marker] = [camera, marker].map(|fixture| self.model.fixture_name(fixture));
-        let kind = InputErrorKind::ViewsUndecided { camera, marker, why };
-        Some(self.measurements.location(row).error(kind))
     }
 
     /// Returns the full parameter vector of the nominal arm, with free bases, targets and fixtures

@@ -1,9 +1,8 @@
 //! Misreadings of images: their candidates, and tables as they should have been read.
 
-use nalgebra::Vector3;
-
 use super::Misreading;
 use super::candidates::MAX_OTHER_CARRIERS;
+use crate::fit::stages::single_views::transposed;
 use crate::measurement::Measurements;
 use crate::observation::FixtureKind;
 use crate::problem::{Fixture, Observation, Problem};
@@ -48,7 +47,8 @@ impl Misreading {
                 }
                 _ => {
                     let points = problem.fixtures.get(marker as usize).map(|of| &of.points[..]);
-                    if let Some(other) = points.and_then(|points| transposed(points, point)) {
+                    let other = points.and_then(|points| transposed(points, point as usize));
+                    if let Some(other) = other.and_then(|other| u32::try_from(other).ok()) {
                         *observation = Observation::Pixel(camera, marker, other);
                     }
                 }
@@ -67,26 +67,6 @@ fn image_height(problem: &Problem, camera: usize) -> Option<f64> {
     let centre = camera.known.get(CENTRE_Y).copied().flatten();
     camera.image.map(|[_, height]| height).or(centre.map(|centre| 2.0 * centre))
 }
-
-/// Returns the number of the point that has the number `point` if a grid is counted along its other
-/// side; `None` if the points form no grid that is numbered row by row.
-///
-/// With R rows of C points, point r C + c of the file has the number c R + r.
-fn transposed(points: &[Vector3<f64>], point: u32) -> Option<u32> {
-    let step = points.get(1)? - points[0];
-    let is_next =
-        |pair: &&[Vector3<f64>]| (pair[1] - pair[0] - step).norm() <= MAX_GRID_ERROR * step.norm();
-    let columns = 1 + points.windows(2).take_while(is_next).count();
-    let rows = points.len() / columns;
-    if rows < 2 || rows * columns != points.len() {
-        return None;
-    }
-    let point = point as usize;
-    u32::try_from(point % rows * columns + point / rows).ok()
-}
-
-/// Largest deviation of the distance between neighbouring points of a grid, relative to it.
-const MAX_GRID_ERROR: f64 = 1e-6;
 
 /// Gives each of the `chosen` rows of `table` the configuration of the view that comes `by` views
 /// earlier. A view is a run of rows with one configuration; at the ends of the table, a row keeps

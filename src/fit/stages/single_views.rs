@@ -1,0 +1,118 @@
+//! Views by themselves: do the points of each image fit the marker, wherever it is?
+//!
+//! The pose of the marker in the camera's frame is fitted to each view without the arm. Views that
+//! fit no pose show a mistake in camera or marker, such as a grid that is declared along its other
+//! side; views that do fit leave the joints and the poses of camera and marker.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DVector, Vector3};
+
+use super::marker_pose::marker_in_camera;
+use crate::model::{Model, Pose};
+use crate::observation::{FixtureValues, slopes_of_pixel};
+use crate::problem::Observation;
+
+/// Largest deviation of the distance between neighbouring points of a grid, relative to it.
+const MAX_GRID_ERROR: f64 = 1e-6;
+/// Minimum number of points of a view that is fitted by itself.
+const MIN_POINTS: usize = 6;
+/// Maximum number of views that are fitted by themselves.
+const MAX_VIEWS: usize = 40;
+/// Smallest rms error of views by themselves \[px\] that shows a mistake in camera or marker: lenses
+/// that are not calibrated leave a few pixels.
+const MIN_MISS: f64 = 10.0;
+/// Largest ratio of the rms error with points counted along the other side to that as declared, at
+/// which they are counted so.
+const MAX_OTHER_RATIO: f64 = 0.2;
+
+/// Median rms errors of views by themselves \[px\].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SingleViews {
+    /// Error with the points as the table numbers them.
+    pub declared: f64,
+    /// Error with the points of a grid counted along its other side.
+    pub transposed: f64,
+}
+
+impl SingleViews {
+    /// Fits the marker's pose to each view in `poses` at the full parameter vector `x`. `None`
+    /// without a view of enough points.
+    pub fn of(model: &Model, poses: &[Pose], x: &DVector<f64>) -> Option<Self> {
+        let fixtures = model.fixtures(x.as_slice());
+        let mut views: BTreeMap<_, Vec<&Pose>> = BTreeMap::new();
+        for pose in poses {
+            let [Some(camera), Some(marker)] = pose.observation.fixtures() else { continue };
+            if matches!(pose.observation, Observation::Pixel(..)) {
+                let bits: Vec<u64> = pose.setup.configuration.iter().map(|q| q.to_bits()).collect();
+                views.entry((camera, marker, pose.base, bits)).or_default().push(pose);
+            }
+        }
+        let views: Vec<((usize, usize), Vec<&Pose>)> = views
+            .into_iter()
+            .filter(|(_, view)| view.len() >= MIN_POINTS)
+            .map(|((camera, marker, ..), view)| ((camera, marker), view))
+            .collect();
+        let step = views.len().div_ceil(MAX_VIEWS).max(1);
+        let errors = |is_transposed: bool| {
+            let error = |((camera, marker), view): &((usize, usize), Vec<&Pose>)| {
+                let points = model.marker_points(*marker);
+                let point = |pose: &&Pose| {
+                    let number = pose.observation.point()?;
+                    let number = if is_transposed { transposed(points, number)? } else { number };
+                    Some((*points.get(number)?, [pose.measured.x, pose.measured.y]))
+                };
+                let points: Option<Vec<_>> = view.iter().map(point).collect();
+                points.map_or(f64::INFINITY, |points| view_error(&fixtures[*camera], &points))
+            };
+            median(views.iter().step_by(step).map(error).collect())
+        };
+        let declared = errors(false)?;
+        Some(Self { declared, transposed: errors(true)? })
+    }
+
+    /// Returns true if the points of most views fit no pose of the marker.
+    pub fn miss_the_marker(self) -> bool {
+        self.declared > MIN_MISS
+    }
+
+    /// Returns true if the points of most views fit the marker once its grid is counted along its
+    /// other side.
+    pub fn are_transposed(self) -> bool {
+        self.miss_the_marker() && self.transposed < MAX_OTHER_RATIO * self.declared
+    }
+}
+
+/// Returns the rms error of a view by itself \[px\]; infinite if its points fit no pose.
+fn view_error(camera: &FixtureValues<f64>, points: &[(Vector3<f64>, [f64; 2])]) -> f64 {
+    let Some(pose) = marker_in_camera(camera, points) else { return f64::INFINITY };
+    let [_, _, _, _, _, _, fx, fy, ..] = camera.numbers;
+    let square = |(place, pixel): &(Vector3<f64>, [f64; 2])| {
+        let at = pose.rotation * place + pose.translation.vector;
+        let [x, y] = slopes_of_pixel(camera, *pixel);
+        (fx * (x - at.x / at.z)).powi(2) + (fy * (y - at.y / at.z)).powi(2)
+    };
+    (points.iter().map(square).sum::<f64>() / points.len().max(1) as f64).sqrt()
+}
+
+/// Returns the median; `None` of no numbers.
+fn median(mut numbers: Vec<f64>) -> Option<f64> {
+    numbers.sort_by(f64::total_cmp);
+    numbers.get(numbers.len() / 2).copied()
+}
+
+/// Returns the number of the point that has the number `point` if a grid is counted along its other
+/// side; `None` if the points form no grid that is numbered row by row.
+///
+/// With R rows of C points, point r C + c of the file has the number c R + r.
+pub(in crate::fit) fn transposed(points: &[Vector3<f64>], point: usize) -> Option<usize> {
+    let step = points.get(1)? - points[0];
+    let is_next =
+        |pair: &&[Vector3<f64>]| (pair[1] - pair[0] - step).norm() <= MAX_GRID_ERROR * step.norm();
+    let columns = 1 + points.windows(2).take_while(is_next).count();
+    let rows = points.len() / columns;
+    if rows < 2 || rows * columns != points.len() {
+        return None;
+    }
+    Some(point % rows * columns + point / rows)
+}
