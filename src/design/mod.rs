@@ -18,6 +18,7 @@ mod growth;
 mod misfit;
 mod next;
 mod plan;
+mod pool;
 mod scan;
 mod sensitivity;
 mod separate;

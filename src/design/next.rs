@@ -6,23 +6,15 @@ use super::exchange::Unknowns;
 use super::explanations::{Explanations, ExplanationsError};
 use super::greedy::Greedy;
 use super::misfit::Misfit;
+use super::pool::{Pool, pool_and_workspace};
 use super::travel::Travel;
 use super::workspace_error::{MisfitSize, WorkspaceError};
-use super::{
-    Candidates, Criterion, DesignError, Exchange, Extremes, Sensitivity, Site, Workspace, views,
-};
+use super::{Candidates, Criterion, DesignError, Exchange, Sensitivity, Site, Workspace, views};
 use crate::fit::{self, FindingCode, Identification, IdentifyError, Options};
 use crate::measurement::{Dataset, Measurements};
 use crate::problem::{Effect, Problem};
 use crate::remainder::{self, Correction, SavedRemainderError};
 
-/// Number of candidates drawn from ranges: uniformly, and with emphasis on the limits.
-const DRAWN_CANDIDATES: [usize; 2] = [500, 1500];
-/// Maximum number of poses over which the variance of predictions is averaged.
-const WORKSPACE_POSES: usize = 500;
-/// Random streams of the uniform candidates, of those with emphasis on the limits, and of the poses
-/// of the workspace.
-const STREAMS: [u64; 3] = [400, 401, 402];
 /// Fraction of the largest gain from which on candidates count as equally good; the least travel of
 /// the joints then decides.
 const EQUAL_GAIN: f64 = 0.98;
@@ -223,7 +215,7 @@ pub fn next(
     let mut site = Site::with_cameras(&designed, &[&measured], pairs)?;
     site.linearise_at(&found, &measured);
     let Pool { candidates: pool, workspace: reference, drawn } =
-        pool_and_workspace(candidates, &site, &measured, options);
+        pool_and_workspace(candidates, &site, &measured, (options.workspace, poses, seed));
     if let Some(region) = options.workspace.filter(|_| pool.is_empty()) {
         return Err(DesignError::nothing_in(region).into());
     }
@@ -381,52 +373,6 @@ fn take_poses(
     Ok(chosen)
 }
 
-/// Candidates for the next poses.
-struct Pool {
-    candidates: Measurements,
-    /// Poses over which predictions are averaged.
-    workspace: Measurements,
-    /// Number of poses drawn to find candidates that cameras see.
-    drawn: Option<usize>,
-}
-
-/// Returns the candidates that have not been measured yet, and the poses of the workspace, over
-/// which predictions are averaged.
-fn pool_and_workspace(
-    candidates: &Candidates,
-    site: &Site,
-    measured: &Measurements,
-    options: &NextOptions,
-) -> Pool {
-    let inside = |table: Measurements| match options.workspace {
-        Some(workspace) => table.select(&site.inside(&table, workspace)),
-        None => table,
-    };
-    match candidates {
-        Candidates::Rows(rows) => {
-            let rows = inside(rows.as_ref().clone().arm_rows());
-            let step = rows.len().div_ceil(WORKSPACE_POSES).max(1);
-            let some: Vec<usize> = (0..rows.len()).step_by(step).collect();
-            let candidates = rows.select(&unmeasured(&rows, measured));
-            Pool { candidates, workspace: rows.select(&some), drawn: None }
-        }
-        Candidates::Within(ranges) => {
-            let drawn = |count: usize, extremes, stream| {
-                let stream = (options.seed, STREAMS[stream]);
-                site.draw_in_view(ranges, (count, extremes), stream, inside)
-            };
-            let [uniform, often] = DRAWN_CANDIDATES.map(|count| count.max(options.poses));
-            let (pool, count) = drawn(uniform, Extremes::No, 0);
-            let (extremes, more) = drawn(often, Extremes::Often, 1);
-            Pool {
-                candidates: pool.concatenate(&extremes),
-                workspace: drawn(WORKSPACE_POSES, Extremes::No, 2).0,
-                drawn: site.is_of_cameras(&pool).then_some(count + more),
-            }
-        }
-    }
-}
-
 /// Returns the uncertainty of predictions by the fit `found`. A remainder is fitted to the same
 /// rows if the problem declares one or the options ask for it. `None` if the data are too few.
 fn correction(
@@ -477,17 +423,6 @@ fn cause_goal(site: &Site, names: &[String], like: &DMatrix<f64>) -> DMatrix<f64
         }
     }
     goal
-}
-
-/// Returns the rows of `table` whose commands and payload no row of `measured` has.
-fn unmeasured(table: &Measurements, measured: &Measurements) -> Vec<usize> {
-    let key = |of: &Measurements, row: usize| -> Vec<u64> {
-        let payload = of.payload.as_ref().map(|payload| payload[row]);
-        of.configuration(row).iter().copied().chain(payload).map(f64::to_bits).collect()
-    };
-    let measured_keys: std::collections::HashSet<Vec<u64>> =
-        (0..measured.len()).map(|row| key(measured, row)).collect();
-    (0..table.len()).filter(|&row| !measured_keys.contains(&key(table, row))).collect()
 }
 
 /// Checks that the request takes neither too long nor too much memory.

@@ -133,7 +133,7 @@ impl Columns {
                 }
                 Meaning::Ignored(_) | Meaning::Unknown if is_result_table && is_result(name) => {}
                 Meaning::Ignored(kind) => {
-                    // A misspelt unit may be the reason for which a column is missing.
+                    // A misspelt unit may hide a column.
                     unknown.extend(matches!(kind, WarningKind::UnitIgnored { .. }).then_some(name));
                     warnings.push(Warning { location: location(), kind });
                 }
@@ -147,10 +147,8 @@ impl Columns {
                     let is_suggested = unknown.len() <= MAX_SUGGESTIONS;
                     let meant =
                         is_suggested.then(|| numbering.meant(name, &present, problem)).flatten();
-                    if let Some(meant) = meant
-                        .as_ref()
-                        .filter(|meant| affects_results(meant) && one_typo(name, meant))
-                    {
+                    let is_typo = |meant: &&String| affects_results(meant) && one_typo(name, meant);
+                    if let Some(meant) = meant.as_ref().filter(is_typo) {
                         let kind = TableErrorKind::MistypedColumn { meant: meant.clone() };
                         mistyped.get_or_insert_with(|| error(kind.into()));
                     }
