@@ -1,5 +1,7 @@
 //! Check of a fit that is far off: some rows do not belong to the arm that most rows fit.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DVector, Vector3};
 use serde_json::json;
 
@@ -10,6 +12,7 @@ use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, Misfit};
 use super::row_kind::format_error;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::{Measurements, Split};
+use crate::model::Pose;
 use crate::problem::JointKind;
 
 /// Number of successive rows of each base to which the nominal arm is registered in a trial. They
@@ -120,7 +123,8 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         let mut factors = LENGTH_FACTORS.into_iter().filter(|_| chosen.len() >= WINDOW);
         factors.find(fits).map(|(_, words)| format!("their positions are in another unit: {words}"))
     };
-    let cause = mistake(&pairs, limit)
+    let cause = other_session(fit, &trial.x, &chosen, limit)
+        .or_else(|| mistake(&pairs, limit))
         .or_else(|| mistaken_joints(fit, &trial.x, &chosen, limit))
         .or_else(stands_elsewhere)
         .or_else(in_other_unit);
@@ -202,6 +206,41 @@ fn windows(fit: &CheckedFit, rows: &[usize]) -> Vec<Vec<usize>> {
         groups.iter().flat_map(part).collect()
     };
     (0..trials).map(window).collect()
+}
+
+/// Returns the words for `chosen` rows that fit the bases of other sessions to `limit` \[m\], with
+/// the registered arm `x`.
+fn other_session(
+    fit: &CheckedFit,
+    x: &DVector<f64>,
+    chosen: &[usize],
+    limit: f64,
+) -> Option<String> {
+    let Fitting { placement, model, .. } = *fit.fitting;
+    let poses = fit.fitting.poses(chosen);
+    let mut sessions = BTreeSet::new();
+    for pose in &poses {
+        let others = (0..placement.bases.len()).filter(|base| *base != pose.base);
+        let moved: Vec<Pose> = others
+            .map(|base| {
+                // Sessions without a column target have a target of their own.
+                let has_target =
+                    placement.targets.get(pose.target) == placement.bases.get(pose.base);
+                let target = placement.bases.get(base).filter(|_| has_target);
+                let target =
+                    target.and_then(|word| placement.targets.iter().position(|of| of == word));
+                Pose { base, target: target.unwrap_or(pose.target), ..*pose }
+            })
+            .collect();
+        let errors = model.residuals(moved.clone(), x);
+        let place = errors.iter().position(|error| error.norm() < limit)?;
+        sessions.insert(placement.bases[moved[place].base].as_str());
+    }
+    let sessions: Vec<&str> = sessions.into_iter().collect();
+    Some(format!(
+        "they fit in session {} instead: correct the column session",
+        sessions.join(" or ")
+    ))
 }
 
 /// Returns the words for a mistake in the joint columns that explains the positions of the `chosen`
