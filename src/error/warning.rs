@@ -202,6 +202,11 @@ pub enum WarningKind {
          and max_rad instead of min_deg and max_deg"
     )]
     LimitsLookLikeRadians { widest: String },
+    #[error(
+        "a focal length of {focal} px is short for an image that is {width} px wide; if it is in \
+         millimetres, divide it by the size of a pixel in millimetres"
+    )]
+    ShortFocalLength { focal: String, width: String },
     #[error("{mass} kg is heavy for a part of an arm; if these are grams, divide by 1000")]
     LooksLikeGrams { mass: String },
     #[error(

@@ -7,6 +7,7 @@ use super::section::Section;
 use super::{Body, Effect, Fixture, Joint, JointKind, ParameterRule, Problem};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::observation::FixtureKind;
+use crate::quantity::format::number;
 use crate::quantity::unrounded_right_angle;
 
 /// Largest plausible length in the joint table \[m\]. Longer ones are probably in millimetres.
@@ -17,6 +18,12 @@ const MAX_LIMIT_RADIANS: f64 = TAU + 0.02;
 /// Largest plausible distance of a fixture from the origin of the measuring frame, or between two
 /// points, as a multiple of the length of the arm's links.
 const MAX_FIXTURE_LINKS: f64 = 20.0;
+/// Index of the focal length along x in the numbers of a camera.
+const FOCAL_X: usize = 6;
+/// Index of the image centre along x in the numbers of a camera.
+const CENTRE_X: usize = 8;
+/// Smallest plausible focal length, relative to the width of the image: an angle of view of 157°.
+const MIN_FOCAL_LENGTH: f64 = 0.1;
 /// Smallest plausible size of a marker \[m\].
 const MIN_MARKER: f64 = 2e-3;
 /// Minimum number of rows or turning joints from which the convention of a table is judged.
@@ -372,8 +379,22 @@ impl Problem {
             let kind = WarningKind::TinyMarker { size: format!("{:.3}", size * 1e3) };
             Some(Warning { location: location.with_key("points_mm"), kind })
         });
+        let short = self.fixtures.iter().find_map(|fixture| {
+            let is_camera = fixture.kind == FixtureKind::Camera;
+            let [focal, centre] = [FOCAL_X, CENTRE_X]
+                .map(|field| fixture.known.get(field).copied().flatten().filter(|_| is_camera));
+            let width = fixture.image.map(|[width, _]| width).or(centre.map(|centre| 2.0 * centre));
+            let (focal, width) = (focal?, width?);
+            let kind = WarningKind::ShortFocalLength {
+                focal: number(focal, 2),
+                width: format!("{width:.0}"),
+            };
+            let location = Location { excerpt: None, ..fixture.location.clone() };
+            let location = location.with_key("focal_px");
+            (focal < MIN_FOCAL_LENGTH * width).then_some(Warning { location, kind })
+        });
         let far = far.into_iter().chain(long).filter(|_| links > 0.0);
-        far.chain(tiny).collect()
+        far.chain(tiny).chain(short).collect()
     }
 
     /// Returns the length of all links together, with the travel of sliding joints \[m\].
