@@ -30,7 +30,7 @@ pub(super) struct Drawn<'a> {
     pub extremes: Option<Measurements>,
     /// Number of poses drawn to find those that cameras see; `None` if cameras do not measure, or
     /// without ranges.
-    pub drawn: Option<usize>,
+    pub count: Option<usize>,
 }
 
 impl<'a> Drawn<'a> {
@@ -47,9 +47,9 @@ impl<'a> Drawn<'a> {
         let site = Site::with_cameras(problem, &measured, views::pairs(problem, &uniform))?;
         if matches!(candidates, Candidates::Within(_)) && site.is_of_cameras(&uniform) {
             let (uniform, extremes, drawn) = tables(problem, candidates, counts, Some(&site));
-            return Ok(Self { site, uniform, extremes, drawn: Some(drawn) });
+            return Ok(Self { site, uniform, extremes, count: Some(drawn) });
         }
-        Ok(Self { site, uniform, extremes, drawn: None })
+        Ok(Self { site, uniform, extremes, count: None })
     }
 }
 

@@ -179,6 +179,7 @@ impl NextError {
 /// # Errors
 /// Returns an error if the measured poses cannot be fitted, no candidate remains, poses for causes
 /// have no effects to decide among, or the request is too large.
+#[expect(clippy::too_many_lines, reason = "one result, listed field by field")]
 pub fn next(
     problem: &Problem,
     data: &Dataset,

@@ -117,6 +117,7 @@ pub struct Plan {
 /// # Errors
 /// Returns an error if there are fewer candidates than poses, or if the problem lacks a
 /// declaration.
+#[expect(clippy::too_many_lines, reason = "one result, listed field by field")]
 pub fn plan(
     problem: &Problem,
     candidates: &Candidates,
@@ -129,7 +130,7 @@ pub fn plan(
     }
     let with_distances = with_known_distances(given, candidates);
     let given = with_distances.as_ref();
-    let Drawn { site, uniform, extremes, drawn } =
+    let Drawn { site, uniform, extremes, count: drawn } =
         Drawn::new(problem, candidates, given, (poses, seed))?;
     let nothing = if site.is_of_cameras(&uniform) && *criterion == Criterion::I {
         return Err(DesignError::NoPositions);
