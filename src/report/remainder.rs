@@ -130,7 +130,7 @@ pub(super) fn why_no_bound(found: &Identification) -> Option<String> {
     let reason = if !found.is_trusted() {
         return None;
     } else if found.prior.is_some() {
-        "with a prior from a file the new rows alone do not determine it".to_owned()
+        "the earlier estimate has none, and the new rows alone do not determine it".to_owned()
     } else if found.fitted.identification.kind != "position" {
         "no positions are measured".to_owned()
     } else if found.poses < MIN_CONFIGURATIONS {
