@@ -223,3 +223,26 @@ fn noise_of_what_is_measured() {
         }
     }
 }
+
+/// A wrong known length makes all lengths of the arm wrong in proportion.
+#[test]
+fn the_scale_of_contacts_is_that_of_the_known_length() {
+    let known = "[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n";
+    let found = |length: &str| {
+        let mut problem = problem(&AROUND.replace(known, length));
+        // Moments of known weights would depend on the lengths.
+        problem.joints.iter_mut().for_each(|joint| joint.stiffness = None);
+        problem.parameters.retain(|rule| !rule.pattern.contains("stiffness"));
+        let (arm, _) = true_arm(&problem, 2);
+        let data = read_dataset(&problem, &Bench::new(arm, 7).table(&["point"], 90));
+        identify(&problem, &data, &Options::default()).unwrap()
+    };
+    let right = found(known);
+    assert!(right.is_trusted(), "{:?}", right.findings);
+    assert!(!right.has(FindingCode::ScaleContradicted), "{:?}", right.findings);
+    let wrong = found(&known.replace("593.7", "581.8"));
+    let finding = wrong.finding(FindingCode::ScaleContradicted).unwrap().to_string();
+    assert!(finding.contains("shorter than declared, in proportion"), "{finding}");
+    assert!(finding.contains("\"left\" to \"right\" is declared 581.817 mm"), "{finding}");
+    assert!(!wrong.is_trusted());
+}

@@ -114,6 +114,9 @@ finding_codes! {
     BeyondPrior: Error "beyond-prior" ["parameter", "sigmas"]
         "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",
         "check axes of the measuring frame, signs of joints, units, and the prior";
+    ScaleContradicted: Error "scale-contradicted" ["error", "sigmas", "lengths"]
+        "All fitted lengths of the arm together deviate from nominal by one factor, more than 0.3 % and more than 5 standard deviations beyond their priors.",
+        "check the lengths that scale the measurements, or the joint table";
     BeyondArmSize: Error "beyond-arm-size" ["parameter", "sizes"]
         "A parameter deviates by more than the size of the arm, half a turn, or a factor of 100.",
         "give it a prior, or check units and the table's columns";
@@ -200,7 +203,7 @@ finding_codes! {
         "measure more poses of this session, or give its base a prior";
     UnsteadyPoint: Warning "unsteady-point" ["point", "times", "share"]
         "The predictions at one touched point scatter far more than at the others, and along one direction.",
-        "check whether the point moved or gave way";
+        "check whether the point moved or gave way; if it moved, declare a further [[point]] and name that one in the rows after the move";
     Outliers: Note "outliers" ["rows", "of"]
         "Some identification rows are farther from the fit than noise explains.",
         "look at these rows; a section [robust] limits their influence";

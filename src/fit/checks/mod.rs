@@ -6,6 +6,7 @@
 pub(super) mod bounds;
 mod changed_rows;
 pub(super) mod checked_fit;
+mod common_scale;
 mod contradicted_entry;
 mod convention;
 mod doubted_columns;
@@ -57,6 +58,7 @@ const CHECKS: &[&dyn Check] = &[
     &changed_rows::RowsStayAlike,
     &Convergence,
     &two_solutions::OneSolution,
+    &common_scale::ScaleHolds,
     &parameter_limits::WithinPriors,
     &parameter_limits::WithinArmSize,
     &held_out::NotAllCopied,
@@ -112,6 +114,7 @@ const MISTAKES: [FindingCode; 6] = [
     FindingCode::RowsDoubted,
     FindingCode::RowsChanged,
     FindingCode::OtherSize,
+    FindingCode::ScaleContradicted,
 ];
 
 /// Codes of findings that follow from a mistake of the input, and whose usual remedies apply only
