@@ -119,7 +119,7 @@ const MISTAKES: [FindingCode; 6] = [
 
 /// Codes of findings that follow from a mistake of the input, and whose usual remedies apply only
 /// without one.
-const CONSEQUENCES: [FindingCode; 7] = [
+const CONSEQUENCES: [FindingCode; 8] = [
     FindingCode::PriorContradicted,
     FindingCode::PriorWidth,
     FindingCode::NoiseBeyondDeclared,
@@ -127,6 +127,7 @@ const CONSEQUENCES: [FindingCode; 7] = [
     FindingCode::HeldOutWorse,
     FindingCode::HeldOutBeyondPrediction,
     FindingCode::HeldOutNotBetter,
+    FindingCode::HeldOutOutliers,
 ];
 
 /// Codes of findings that elasticity causes if a rigid arm is fitted.
@@ -138,6 +139,14 @@ const OF_RIGID_ARM: [FindingCode; 6] = [
     FindingCode::HeldOutOutliers,
     FindingCode::RowsSetAside,
 ];
+
+/// Codes of findings that the fit is far off, with or without a known cause.
+const FAR_OFF: [FindingCode; 2] =
+    [FindingCode::MissesMeasurements, FindingCode::NoBetterThanNominal];
+
+/// Codes of findings that the residual of the fitted rows is beyond the declared σ.
+const BEYOND_NOISE: [FindingCode; 2] =
+    [FindingCode::NoiseBeyondDeclared, FindingCode::ResidualBeyondDeclared];
 
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
@@ -196,6 +205,7 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
             );
         }
     }
+    state_held_out_remedies(&mut findings);
     findings
 }
 
@@ -218,5 +228,32 @@ fn state_explanations(findings: &mut [Finding]) {
             finding.remedy
         );
         *finding = finding.clone().with_remedy(remedy);
+    }
+}
+
+/// Replaces remedies about held-out rows that would lead away from a misfit of the fitted rows.
+fn state_held_out_remedies(findings: &mut [Finding]) {
+    let has = |codes: &[FindingCode]| findings.iter().any(|found| codes.contains(&found.code));
+    let (is_far_off, is_beyond_noise) = (has(&FAR_OFF), has(&BEYOND_NOISE));
+    for finding in findings {
+        // Remedies that name a cause stay.
+        if finding.remedy != finding.code.entry().remedy {
+            continue;
+        }
+        let remedy = match finding.code {
+            FindingCode::HeldOutWorse
+            | FindingCode::HeldOutNotBetter
+            | FindingCode::HeldOutOutliers
+                if is_far_off =>
+            {
+                "find first why the fitted rows are missed; more poses or other priors do not mend that"
+            }
+            FindingCode::HeldOutOutliers if is_beyond_noise => {
+                "the fitted rows are off too: look first for what the model lacks with flexcal loop, \
+                 then at these rows"
+            }
+            _ => continue,
+        };
+        *finding = finding.clone().with_remedy(remedy.to_owned());
     }
 }
