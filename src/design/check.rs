@@ -88,6 +88,9 @@ pub struct Check {
     pub distinct_poses: usize,
     /// Number of free parameters without a prior.
     pub without_prior: usize,
+    /// Statement that the checked poses leave the scale open, with a remedy; `None` if they
+    /// determine it.
+    pub open_scale: Option<String>,
 }
 
 /// Forecasts the results of measurements in the poses `checked`; `seed` determines all draws.
@@ -173,6 +176,10 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
         ),
         distinct_poses: count_distinct(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
+        open_scale: {
+            let names: Vec<&str> = parameters.iter().map(|parameter| &*parameter.name).collect();
+            crate::fit::open_scale(problem, &poses, &names)
+        },
     })
 }
 

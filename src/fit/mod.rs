@@ -43,7 +43,7 @@ pub use apply::saved_estimate_error::SavedEstimateError;
 pub use apply::tolerance::{Tolerance, ToleranceTest, Verdict};
 pub use checks::finding::{Finding, FindingCode, Severity};
 pub(crate) use checks::misreading::MisreadEffect;
-pub(crate) use checks::open_directions::open_quantities;
+pub(crate) use checks::open_directions::{open_quantities, open_scale};
 pub use checks::outliers::{InfluentialRows, Outlier};
 pub use checks::point_spread::PointSpread;
 pub(crate) use checks::required_columns::check_columns;

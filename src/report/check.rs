@@ -54,7 +54,7 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
             names.len(),
             check.coordinates,
         )]),
-        unidentifiable(&forecast.identifiability, &names, "check.json"),
+        unidentifiable(&forecast.identifiability, &names, ("check.json", check.open_scale.as_deref())),
         Block::lines(
             "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of predictions):",
         ),

@@ -19,7 +19,9 @@ use super::render::{Report, report, text};
 use super::residual_tests;
 use super::row_kinds::row_kind_tables;
 use super::trust::outcome;
-use crate::fit::{ErrorSummary, Errors, Identification, JointSources, OrientationErrors};
+use crate::fit::{
+    ErrorSummary, Errors, Finding, FindingCode, Identification, JointSources, OrientationErrors,
+};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number};
 use crate::results::{PlotData, nominal_arm, rows_in};
@@ -252,10 +254,18 @@ fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
     Some(Block::Table(Table::new(&["orientation, °", "", "mean", "rms", "max"], rows, &[0, 1])))
 }
 
+/// Largest length at an observed point that is stated for an image error: one metre \[m\].
+const MAX_LENGTH_AT_POINT: f64 = 1.0;
+
 /// States the lengths at the observed points that correspond to held-out image errors; `None` for
 /// other kinds of rows.
 fn at_points(held_out: &ErrorSummary) -> Option<String> {
-    let [mean, max, rms] = held_out.at_point?.map(|sizes| number(sizes.norm * 1e3, 4));
+    let at_point = held_out.at_point?;
+    // Views that are far off say nothing about lengths.
+    if at_point.iter().any(|sizes| sizes.norm > MAX_LENGTH_AT_POINT) {
+        return None;
+    }
+    let [mean, max, rms] = at_point.map(|sizes| number(sizes.norm * 1e3, 4));
     Some(format!(
         "Held-out image errors correspond to {mean} mm (mean), {rms} mm (rms), {max} mm (max) at the observed points."
     ))
@@ -321,9 +331,13 @@ pub(super) fn identifiability_with_figures<'a>(
 /// Returns the blocks on identifiability without figures. `file` names what contains the omitted
 /// entries.
 fn identifiability_blocks<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
+    let is_open_scale = |finding: &&Finding| {
+        finding.code == FindingCode::NotToldApart && finding.word("what") == Some("scale")
+    };
+    let open_scale = found.findings.iter().find(is_open_scale).map(ToString::to_string);
     let mut blocks = vec![
         conditioning(found.identifiability(), found.unknowns.len(), found.coordinates),
-        unidentifiable(found.identifiability(), &found.unknowns, file),
+        unidentifiable(found.identifiability(), &found.unknowns, (file, open_scale.as_deref())),
     ];
     blocks.extend(more_unidentifiable(found, file));
     blocks.extend(weak(found, file));

@@ -178,13 +178,16 @@ pub(super) fn against_priors(found: &Identification) -> Option<Drawing> {
 }
 
 /// Lists the combinations of parameters that the measurements do not determine at the nominal arm.
-/// `file` names what contains all of them.
+/// `file` names what contains all of them, and `open_scale` states that the scale is open.
 pub(super) fn unidentifiable<'a>(
     found: &Identifiability,
     unknowns: &[String],
-    file: &str,
+    (file, open_scale): (&str, Option<&str>),
 ) -> Block<'a> {
     let unidentifiable = &found.unidentifiable;
+    if let Some(words) = open_scale.filter(|_| unidentifiable.is_empty()) {
+        return Block::lines(format!("The measurements alone leave open:\n{words}."));
+    }
     if unidentifiable.is_empty() {
         return Block::lines(
             "All combinations of the parameters are identifiable at the nominal arm.",
@@ -203,7 +206,13 @@ pub(super) fn unidentifiable<'a>(
         MAX_LISTED,
         file,
     );
-    points.extend(open_quantities(unidentifiable, unknowns));
+    let quantities = open_quantities(unidentifiable, unknowns);
+    points.extend(open_scale.filter(|_| quantities.is_empty()).map(str::to_owned));
+    points.extend(quantities);
+    points.push(
+        "Where no prior decides, fix one parameter of each combination (fixed = true) or give it a prior (sigma_mm, sigma_deg)."
+            .to_owned(),
+    );
     Block::Lines(words, points)
 }
 

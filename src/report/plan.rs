@@ -116,7 +116,7 @@ fn blocks<'a>(
         names.len(),
         plan.coordinates,
     )]));
-    blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));
+    blocks.push(unidentifiable(&planned.identifiability, &names, ("plan.json", None)));
     // Rows of a camera's table are points, not poses.
     let fitted = (!plan.is_of_cameras || given == 0).then_some(poses + given);
     blocks.extend(assumptions(problem, &planned.expected, fitted));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexcal::fit::{FindingCode, Options, identify};
+use flexcal::fit::{FindingCode, Identification, Options, identify};
 use flexcal::least_squares::UnidentifiableCombination;
 use flexcal::rig::Truth;
 
@@ -224,7 +224,8 @@ fn noise_of_what_is_measured() {
     }
 }
 
-/// A wrong known length makes all lengths of the arm wrong in proportion.
+/// Contacts without a known length leave the scale open, however narrow the priors of the lengths
+/// are; a wrong length makes all lengths wrong in proportion.
 #[test]
 fn the_scale_of_contacts_is_that_of_the_known_length() {
     let known = "[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n";
@@ -237,8 +238,13 @@ fn the_scale_of_contacts_is_that_of_the_known_length() {
         let data = read_dataset(&problem, &Bench::new(arm, 7).table(&["point"], 90));
         identify(&problem, &data, &Options::default()).unwrap()
     };
+    let is_open = |found: &Identification| {
+        found.findings.iter().any(|finding| finding.word("what") == Some("scale"))
+    };
+    let without = found("");
+    assert!(is_open(&without), "{:?}", without.findings);
     let right = found(known);
-    assert!(right.is_trusted(), "{:?}", right.findings);
+    assert!(right.is_trusted() && !is_open(&right), "{:?}", right.findings);
     assert!(!right.has(FindingCode::ScaleContradicted), "{:?}", right.findings);
     let wrong = found(&known.replace("593.7", "581.8"));
     let finding = wrong.finding(FindingCode::ScaleContradicted).unwrap().to_string();

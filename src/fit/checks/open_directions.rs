@@ -12,7 +12,9 @@ use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use crate::fit::stages::parameter_size::plausible_size;
 use crate::least_squares::{UnidentifiableCombination, Weak};
+use crate::measurement::Measurements;
 use crate::model::parameter::Parameter;
+use crate::problem::{Joint, JointKind, Observation, Problem};
 use crate::quantity::Unit;
 
 /// Largest squared part of a unit direction outside a set of unknowns at which the direction lies
@@ -109,9 +111,8 @@ impl Check for NamedDirections {
         };
         let sizes: Vec<f64> = parameters.iter().map(size).collect();
         let plausible_sizes: Vec<Option<f64>> = sizes.iter().copied().map(Some).collect();
-        let Some(Weak { rows, .. }) = Weak::of(fit.triangle, &plausible_sizes) else {
-            return Vec::new();
-        };
+        let rows = Weak::of(fit.triangle, &plausible_sizes)
+            .map_or_else(|| DMatrix::zeros(0, sizes.len()), |weak| weak.rows);
         let scaled = DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, j| rows[(i, j)] * sizes[j]);
         let names: Vec<&str> = parameters.iter().map(|parameter| &*parameter.name).collect();
         let finding = |(open, names): (Open, Vec<String>)| {
@@ -119,8 +120,73 @@ impl Check for NamedDirections {
             let numbers = [json!(open.word()), json!(names)];
             Finding::new(FindingCode::NotToldApart, numbers, text).with_remedy(remedy)
         };
-        open_directions(&scaled, &names).into_iter().map(finding).collect()
+        let mut open = open_directions(&scaled, &names);
+        // The nominal arm misses contacts, so that another scale changes the data there.
+        if open.iter().all(|(open, _)| *open != Open::Scale) {
+            open.extend(scale(fit.problem, fit.fitting.measurements, &names));
+        }
+        open.into_iter().map(finding).collect()
     }
+}
+
+/// Returns the sentence, with a remedy, that the rows of `table` leave the scale open; `None` if
+/// they determine it, or if that is not certain. `unknowns` are the names of the free parameters.
+pub(crate) fn open_scale(
+    problem: &Problem,
+    table: &Measurements,
+    unknowns: &[&str],
+) -> Option<String> {
+    let (open, names) = scale(problem, table, unknowns)?;
+    Some(open.words(&listed(&names)).join("; "))
+}
+
+/// Returns the scale with the lengths that change in proportion if no row measures a length:
+/// contacts with points at unknown places remain contacts if all lengths have one factor. `None` if
+/// a length is known.
+///
+/// Lengths that other unknowns make up for may be held: those of the first joint, which move all
+/// points, and those from d of the last joint on, which move the target. Priors give the scale, but
+/// do not measure it.
+fn scale(
+    problem: &Problem,
+    table: &Measurements,
+    unknowns: &[&str],
+) -> Option<(Open, Vec<String>)> {
+    let is_free = |name: &str| unknowns.contains(&name);
+    let has_axes =
+        |group: &str| ["x", "y", "z"].iter().all(|axis| is_free(&format!("{group}.{axis}")));
+    let is_unknown = |observation: &Observation| match *observation {
+        Observation::Point(point) => {
+            let fixture = problem.fixtures.get(point);
+            fixture.is_some_and(|point| has_axes(&format!("point[{}]", point.name)))
+        }
+        Observation::Tilt(_) => true,
+        _ => false,
+    };
+    let rows: Vec<Observation> = (0..table.len()).map(|row| table.observation(row)).collect();
+    let touches = rows.iter().any(|row| row.is_point());
+    if !touches || !rows.iter().all(is_unknown) || !problem.distances.is_empty() {
+        return None;
+    }
+    let has_other_lengths =
+        problem.is_elastic() || problem.joints.iter().any(|joint| joint.beam.is_some());
+    if has_other_lengths || !problem.targets.is_empty() || !has_axes("tool") {
+        return None;
+    }
+    let moves = |joint: &Joint| joint.command_kind() != JointKind::Fixed;
+    let last = problem.joints.iter().rposition(moves)?;
+    let mut lengths = Vec::new();
+    for (index, joint) in problem.joints.iter().enumerate().take(last + 1).skip(1) {
+        let placed = joint.placement.as_ref().map_or([0.0; 3], |placed| placed.xyz.into());
+        let d = if index == last { 0.0 } else { joint.d };
+        let entries =
+            [("a", joint.a), ("d", d), ("x", placed[0]), ("y", placed[1]), ("z", placed[2])];
+        for (field, _) in entries.into_iter().filter(|(_, length)| *length != 0.0) {
+            lengths.push(format!("joint{}.{field}", index + 1));
+        }
+    }
+    let are_free = lengths.iter().all(|name| is_free(name));
+    (are_free && !lengths.is_empty()).then_some((Open::Scale, lengths))
 }
 
 /// Returns a sentence with a remedy for each kind of quantity that unidentifiable `combinations` of
