@@ -103,3 +103,13 @@ fn wrong_places_of_masses_are_named_near_the_noise() {
         assert!(finding.to_string().contains(words), "{words}: {finding}");
     }
 }
+
+#[test]
+fn payloads_of_the_next_row_are_named() {
+    let mut data = measured();
+    data.measurements.payload.as_mut().unwrap().rotate_right(1);
+    let found = fit_as_command(&arm(5.2), &data);
+    let finding = found.finding(FindingCode::Misread);
+    let words = finding.unwrap_or_else(|| panic!("{:?}", found.findings)).to_string();
+    assert!(words.contains("payloads that belong to the configuration 1 row before"), "{words}");
+}

@@ -75,6 +75,7 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(long.then_some(Misreading::ArmInMillimetres));
     units.extend(of_commands(problem));
     units.extend(of_order(table));
+    units.extend(of_text_order(table));
     units.extend(of_joint_table(problem));
     units.extend(of_loads(problem, table));
     units.extend(of_targets(problem));
@@ -130,6 +131,8 @@ fn of_commands(problem: &Problem) -> Vec<Misreading> {
     let mut misreadings: Vec<Misreading> =
         moving.iter().map(|&joint| Misreading::reversed(&[joint])).collect();
     misreadings.extend(is_ordered.then_some(Misreading::OppositeOrder));
+    let is_alphabetical = by_name(problem).is_sorted();
+    misreadings.extend((is_ordered && !is_alphabetical).then_some(Misreading::Alphabetical));
     let places = if is_ordered { moving.len() } else { 1 };
     misreadings.extend((1..places).map(|by| Misreading::Rotated { by }));
     for (k, &joint) in moving.iter().enumerate().take(MAX_PAIRED) {
@@ -168,6 +171,32 @@ pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     let places = (0..table.len()).step_by(step).take(SHIFT_PLACES);
     let of_place = |from: usize| shifts.clone().map(move |by| Misreading::Shifted { by, from });
     places.flat_map(of_place).collect()
+}
+
+/// Returns the misreadings in which one of two joined tables is sorted by the text of its row
+/// numbers. The order differs from that of the numbers from ten rows on.
+fn of_text_order(table: &Measurements) -> Vec<Misreading> {
+    let order = |first| {
+        let of = move |is_of_joints| Misreading::TextOrder { first, is_of_joints };
+        [false, true].map(of)
+    };
+    if table.len() < 10 { Vec::new() } else { [0, 1].into_iter().flat_map(order).collect() }
+}
+
+/// Returns the indices of the joints that take commands, in the alphabetical order of their names.
+pub(super) fn by_name(problem: &Problem) -> Vec<usize> {
+    let moves = |joint: &usize| problem.joints[*joint].command_kind() != JointKind::Fixed;
+    let mut joints: Vec<usize> = (0..problem.joints.len()).filter(moves).collect();
+    joints.sort_by_key(|&joint| &problem.joints[joint].name);
+    joints
+}
+
+/// Returns the numbers of `rows` rows, from `first` on, in the order of their texts.
+pub(super) fn text_order(rows: usize, first: u8) -> Vec<usize> {
+    let first = usize::from(first);
+    let mut numbers: Vec<usize> = (first..first + rows).collect();
+    numbers.sort_by_key(usize::to_string);
+    numbers
 }
 
 /// Returns the number of rows between two rows at which a trial shift begins, for a table of `rows`

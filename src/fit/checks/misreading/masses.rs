@@ -36,6 +36,9 @@ pub(in crate::fit) fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanatio
     let measurements = fit.fitting.measurements;
     let mut tested = of_masses(fit.problem, measurements, &MASS_SCALES);
     tested.extend(of_places(fit.problem, measurements));
+    let has_payloads = measurements.payload.is_some();
+    let shifts = [-1, 1].map(|by| Misreading::ShiftedPayload { by });
+    tested.extend(shifts.into_iter().filter(|_| has_payloads));
     let (few, start) = (Trial::with_rows(fit, MAX_RANKED_ROWS), &fit.end.x);
     let error = |&misreading: &Misreading| {
         let error = few.with_corrected(misreading, false, |fitting, _| {

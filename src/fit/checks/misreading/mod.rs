@@ -60,6 +60,15 @@ pub enum Misreading {
     },
     /// The columns of all joints are in the opposite order.
     OppositeOrder,
+    /// The columns of all joints are in the alphabetical order of the joints' names.
+    Alphabetical,
+    /// Rows of one of two joined tables are sorted by the text of their numbers: 1, 10, 11, 2.
+    TextOrder {
+        /// Smallest number of a row.
+        first: u8,
+        /// True if the configurations are sorted so, false if the positions are.
+        is_of_joints: bool,
+    },
     /// The columns of all joints are shifted to the right; the last ones come first.
     Rotated {
         /// Number of places by which the columns are shifted to the right.
@@ -211,6 +220,11 @@ pub enum Misreading {
     Payload {
         /// Unit or decimal point of the numbers in the table.
         scale: MassScale,
+    },
+    /// The column of payloads is shifted against the configurations.
+    ShiftedPayload {
+        /// Number of rows by which a payload comes after its configuration; negative if before.
+        by: i8,
     },
     /// Stiffnesses of joints are in another unit.
     Stiffness {

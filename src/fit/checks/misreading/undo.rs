@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::candidates::{
-    MIN_MILLIMETRE_LENGTH, is_far, lengths_of, masses_of, number_of, turns_in,
+    MIN_MILLIMETRE_LENGTH, by_name, is_far, lengths_of, masses_of, number_of, text_order, turns_in,
 };
 use super::images::shift_views;
 use super::{MassScale, Misreading, numbers_of};
@@ -266,8 +266,21 @@ impl Misreading {
             let mut rows = table.select(&chosen);
             rows.positions = sources.into_iter().map(|row| table.positions[row]).collect();
             rows
+        } else if let Self::ShiftedPayload { by } = self {
+            // Rows whose payload the table does not hold are left out.
+            let source = |row: usize| {
+                row.checked_add_signed(by.into()).filter(|&source| source < table.len())
+            };
+            let pairs = chosen.iter().filter_map(|&row| Some((row, source(row)?)));
+            let (chosen, sources): (Vec<usize>, Vec<usize>) = pairs.unzip();
+            let mut rows = table.select(&chosen);
+            let of_table = table.payload.as_ref();
+            rows.payload = of_table.map(|of| sources.into_iter().map(|row| of[row]).collect());
+            rows
         } else {
-            table.select(chosen)
+            let mut rows = table.select(chosen);
+            self.undo_order(&mut rows, table, chosen);
+            rows
         };
         if joints != rows.joints {
             resize(&mut rows, joints);
@@ -320,6 +333,20 @@ impl Misreading {
         rows
     }
 
+    /// Corrects the order of positions in `rows`, the `chosen` ones of `table`.
+    fn undo_order(self, rows: &mut Measurements, table: &Measurements, chosen: &[usize]) {
+        let Self::TextOrder { first, is_of_joints } = self else { return };
+        let numbers = text_order(table.len(), first);
+        let index = |number: usize| number - usize::from(first);
+        let mut source: Vec<usize> = numbers.iter().copied().map(index).collect();
+        if !is_of_joints {
+            for (place, &number) in numbers.iter().enumerate() {
+                source[index(number)] = place;
+            }
+        }
+        rows.positions = chosen.iter().map(|&row| table.positions[source[row]]).collect();
+    }
+
     /// Corrects the misreading in a configuration `q` of `table`.
     fn undo_command(self, q: &mut [f64], problem: &Problem, table: &Measurements) {
         match self {
@@ -350,6 +377,13 @@ impl Misreading {
                     _ => values.reverse(),
                 }
                 commanded.iter().zip(values).for_each(|(&joint, value)| q[joint] = value);
+            }
+            Self::Alphabetical => {
+                let sorted = by_name(problem);
+                let mut commanded = sorted.clone();
+                commanded.sort_unstable();
+                let values: Vec<f64> = commanded.iter().map(|&joint| q[joint]).collect();
+                sorted.iter().zip(values).for_each(|(&joint, value)| q[joint] = value);
             }
             Self::Reversed { joints } => {
                 numbers_of(joints).for_each(|joint| q[joint - 1] = -q[joint - 1]);

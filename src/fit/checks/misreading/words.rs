@@ -163,6 +163,16 @@ impl fmt::Display for Misreading {
             Self::Radians => f.write_str("joint angles that are radians, declared as degrees"),
             Self::Gradians => f.write_str("joint angles that are gradians, declared as degrees"),
             Self::OppositeOrder => f.write_str("columns of all joints in the opposite order"),
+            Self::Alphabetical => f.write_str(
+                "columns of all joints in the alphabetical order of the joints' names (as in ROS joint_states; name the columns after the joints)",
+            ),
+            Self::TextOrder { is_of_joints, .. } => {
+                let what = if is_of_joints { "joint angles" } else { "positions" };
+                write!(
+                    f,
+                    "{what} whose rows are sorted by the text of their numbers (1, 10, 11, …, 2; join the tables by name or number, not by order)"
+                )
+            }
             Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
             Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
             Self::Inches => f.write_str("positions that are inches, declared as millimetres"),
@@ -259,6 +269,11 @@ impl Misreading {
                 write!(f, "mass {mass}, counted along the arm, that is {scale}")
             }
             Self::Payload { scale } => write!(f, "payloads that are {scale}"),
+            Self::ShiftedPayload { by } => {
+                let (rows, side) = (by.unsigned_abs(), if by > 0 { "before" } else { "after" });
+                let plural = if rows == 1 { "" } else { "s" };
+                write!(f, "payloads that belong to the configuration {rows} row{plural} {side}")
+            }
             Self::Stiffness { joint, power } => {
                 let verb = if joint == 0 { "are" } else { "is" };
                 match joint {
@@ -295,7 +310,11 @@ impl Misreading {
             ),
             Self::Gravity { axis, is_negative } => {
                 let sign = if is_negative { "−" } else { "+" };
-                write!(f, "gravity that points along {sign}{}", ['x', 'y', 'z'][axis])
+                write!(
+                    f,
+                    "gravity that points along {sign}{} (gravity_m_s2)",
+                    ['x', 'y', 'z'][axis]
+                )
             }
             _ => self.fmt_of_table(f),
         }
