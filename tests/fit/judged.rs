@@ -45,25 +45,30 @@ pub fn measured(problem: &Problem, seed: u64) -> Dataset {
 #[test]
 fn poses_that_say_little_about_others_are_named() {
     let problem = arm(PRIORS);
-    let with = |edit: &dyn Fn(usize, f64) -> f64| {
+    let in_arm = |problem: &Problem, edit: &dyn Fn(usize, f64) -> f64| {
         let mut rng = ChaCha8Rng::seed_from_u64(9);
-        let mut rows = at_random(&problem, 90, 2.0, &mut rng);
+        let mut rows = at_random(problem, 90, 2.0, &mut rng);
         let joints = rows.joints;
         let commands = rows.configurations.iter_mut().enumerate();
         commands.for_each(|(place, q)| *q = edit(place % joints, *q));
-        let truth = draw(&model_of(&problem, &rows), |_| 1e-3, &mut rng);
-        measure(&problem, &mut rows, &truth, SIGMA, &mut rng);
-        let found = fit(&problem, &divided(60, &rows));
+        let truth = draw(&model_of(problem, &rows), |_| 1e-3, &mut rng);
+        measure(problem, &mut rows, &truth, SIGMA, &mut rng);
+        let found = fit(problem, &divided(60, &rows));
         assert!(found.is_trusted(), "{:?}", found.findings);
         found.finding(FindingCode::NarrowPoses).map(ToString::to_string).unwrap_or_default()
     };
+    let with = |edit: &dyn Fn(usize, f64) -> f64| in_arm(&problem, edit);
     assert_eq!(with(&|_, q| q), "");
     let still = with(&|joint, q| if joint == 2 { 0.35 } else { q });
     assert!(still.contains("q3 stays at 20.1° in all fitted rows"), "{still}");
     let alike = with(&|joint, q| 0.3 * joint as f64 + 0.01 * q);
     assert!(alike.contains("no joint turns by more than 2."), "{alike}");
-    // The target lies beside the axis of the last joint.
+    // The target lies beside the axis of the last joint, also behind a fixed flange.
     let last = with(&|joint, q| if joint == 4 { 0.35 } else { q });
+    assert!(last.contains("q5 stays at 20.1°"), "{last}");
+    let flange = "[[joint]]\nname = 'flange'\nkind = 'fixed'\nd_m = 0.1\n[tool]";
+    let with_flange = parse(&text(PRIORS).replace("[tool]", flange));
+    let last = in_arm(&with_flange, &|joint, q| if joint == 4 { 0.35 } else { q });
     assert!(last.contains("q5 stays at 20.1°"), "{last}");
 }
 
@@ -252,6 +257,29 @@ fn what_may_have_been_misread_is_said() {
         data.measurements.configurations.chunks_exact_mut(5).for_each(<[f64]>::reverse);
     });
     assert_eq!(opposite, [Misreading::OppositeOrder.to_string()]);
+    // Columns as in a message joint_states, which lists joints by name.
+    let sorted = with(&|problem, data| {
+        let names = ["turn", "lift", "bend", "roll", "pitch"];
+        problem.joints.iter_mut().zip(names).for_each(|(joint, name)| joint.name = name.to_owned());
+        let rows = data.measurements.configurations.chunks_exact_mut(5);
+        rows.for_each(|q| q.copy_from_slice(&[q[2], q[1], q[4], q[3], q[0]]));
+    });
+    assert_eq!(sorted, [Misreading::Alphabetical.to_string()]);
+    // Rows P0, P1, P10, P11, … of one table beside rows P0, P1, P2, … of the other.
+    let mut numbers: Vec<usize> = (0..90).collect();
+    numbers.sort_by_key(usize::to_string);
+    let by_text = with(&|_, data| {
+        let positions = &data.measurements.positions;
+        data.measurements.positions = numbers.iter().map(|&row| positions[row]).collect();
+    });
+    let text_order = |is_of_joints| Misreading::TextOrder { first: 0, is_of_joints }.to_string();
+    assert_eq!(by_text, [text_order(false)]);
+    let of_joints = with(&|_, data| {
+        let rows = &data.measurements.configurations;
+        let sorted = numbers.iter().flat_map(|&row| rows[5 * row..5 * row + 5].to_vec());
+        data.measurements.configurations = sorted.collect();
+    });
+    assert_eq!(of_joints, [text_order(true)]);
     // A free tool moves to its true position, far beyond its prior.
     let held = arm("'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'base.*' = { free = true }");
     let far = with(&|problem, _| {

@@ -65,9 +65,7 @@ impl Check for PosesSpread {
             return vec![finding.with_remedy(measure.to_owned())];
         }
         // A target on the axis of the last joint stays where it is.
-        let tool = &fit.problem.tool;
-        let is_on_axis = fit.problem.targets.is_empty() && tool.target.xy().norm() < MAX_OFF_AXIS;
-        if joints.last() != Some(&tool.joint) || is_on_axis {
+        if joints.last().is_some_and(|&joint| !moves_target(fit, &rows, joint)) {
             joints.pop();
         }
         let still = still_joints(fit, &rows, &joints);
@@ -81,10 +79,20 @@ impl Check for PosesSpread {
         };
         let verb = if still.len() == 1 { "stays" } else { "stay" };
         let text = format!(
-            "{} {verb}{place} in all fitted rows, so that predictions with other values may be wrong by far \
-             more than their bound",
+            "{} {verb}{place} in all fitted rows, so that the fit says little about predictions with other \
+             values",
             names.join(", ")
         );
         vec![Finding::new(FindingCode::NarrowPoses, [json!(names), false.into()], text)]
     }
+}
+
+/// Returns true if the joint at index `joint` moves the measured point of one of the `rows`.
+fn moves_target(fit: &CheckedFit, rows: &[usize], joint: usize) -> bool {
+    let table = fit.fitting.measurements;
+    let measures_length = |row: &&usize| table.observation(**row).measures_length();
+    let Some(&row) = rows.iter().find(measures_length) else { return false };
+    let poses = fit.fitting.poses(&[row]);
+    let jacobians = fit.fitting.model.command_jacobian(fit.problem, poses, &fit.end.x);
+    jacobians.iter().any(|by_command| by_command.column(joint).norm() > MAX_OFF_AXIS)
 }
