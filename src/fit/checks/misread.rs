@@ -28,6 +28,10 @@ const MAX_SIGMAS_LEFT_BY_MASS: f64 = 1.5;
 /// sure although more than noise is left. Another cause that acts alike hardly removes as much.
 const MAX_CLEAR_RATIO: f64 = 0.02;
 
+/// Largest ratio of the rms residual of the fit as read to its error with the deviations from
+/// priors, at which the text states the residual.
+const MAX_PLAIN_PART: f64 = 0.8;
+
 /// Maximum number of misreadings that the text of the finding names.
 const MAX_NAMED: usize = 4;
 
@@ -82,8 +86,17 @@ impl Check for ReadAsMeant {
             [best.rms, explanations.as_read].map(|error| format_error(name, error, 3));
         let numbers = [json!(words), explanations.as_read.into(), best.rms.into()];
         if is_noise {
+            // Parameters far beyond their priors may fit the table as it was read.
+            let instead = if rms < MAX_PLAIN_PART * explanations.as_read {
+                let plain = format_error(name, rms, 3);
+                format!(
+                    "{rest}, and as read it is {plain} only with parameters far beyond their priors"
+                )
+            } else {
+                format!("{rest} instead of {as_read}")
+            };
             let text = format!(
-                "the measurements fit if they are read in another way: with {named}{more}, the error would be {rest} instead of {as_read}"
+                "the measurements fit if they are read in another way: with {named}{more}, the error would be {instead}"
             );
             return vec![Finding::new(FindingCode::Misread, numbers, text)];
         }
