@@ -144,6 +144,11 @@ pub enum TableErrorKind {
     )]
     AllMissing,
     #[error(
+        "no row depends on the arm: camera \"{camera}\" and marker \"{marker}\" both stand on \"world\", as all \
+         cameras and markers of the rows do; declare the frame that carries one of them, as in on = \"tool\""
+    )]
+    NothingMoves { camera: String, marker: String },
+    #[error(
         "{rows} rows of different poses measure exactly 0, 0, 0, the first here{}; if the \
          instrument writes zeros for a lost target, write missing = \"{write}\" in [data.format]",
         listed(*rows, others)

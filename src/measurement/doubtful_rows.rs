@@ -2,7 +2,7 @@
 //! pixel outside its image, and session names that are written in two ways.
 
 use super::Measurements;
-use crate::error::{Warning, WarningKind};
+use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Joint, JointKind, Observation, Problem};
 
 /// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
@@ -23,6 +23,25 @@ impl Measurements {
         let held = self.held_positions(problem);
         let outside = self.pixels_outside(problem);
         repeated.into_iter().chain(held).chain(self.time_going_back()).chain(outside).collect()
+    }
+
+    /// Checks that the rows do not all show markers at rest in the images of cameras at rest.
+    pub(super) fn require_moving_views(&self, problem: &Problem) -> Result<(), InputError> {
+        let at_rest = |row: usize| {
+            let Observation::Pixel(camera, marker, _) = self.observation(row) else { return None };
+            let [camera, marker] = [camera, marker].map(|of| problem.fixtures.get(of as usize));
+            let names = (camera?.name.clone(), marker?.name.clone());
+            (camera?.carrier.is_none() && marker?.carrier.is_none()).then_some(names)
+        };
+        if !(0..self.len()).all(|row| at_rest(row).is_some()) {
+            return Ok(());
+        }
+        match at_rest(0).filter(|_| !self.is_empty()) {
+            Some((camera, marker)) => {
+                Err(self.location(0).error(TableErrorKind::NothingMoves { camera, marker }))
+            }
+            None => Ok(()),
+        }
     }
 
     /// Returns a warning at the first pixel that lies outside the declared size of its image.

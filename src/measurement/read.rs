@@ -289,6 +289,7 @@ impl<'a> Tables<'a> {
                     warnings.extend(log.warnings()?);
                     measurements.files.extend(log.files());
                 }
+                measurements.require_moving_views(problem)?;
                 observed::add_known_distances(&mut measurements, problem)?;
                 let commands = commands(&columns);
                 warnings.extend(measurements.many_turns(problem, &commands));

@@ -32,11 +32,13 @@ impl Document {
         let near_text: String =
             self.text.get(span).unwrap_or_default().trim().chars().take(40).collect();
         let line_after = after.lines().next().unwrap_or_default();
-        let (message, remedy) = usual_mistake(before_in_line, line_after, error.message())
-            .map_or_else(
-                || (error.message().to_owned(), None),
-                |(what, remedy)| (what, Some(remedy)),
-            );
+        let usual = usual_mistake(before_in_line, line_after, error.message());
+        let single = single_brackets(previous_lines, before_in_line, line_after);
+        let single = single.filter(|_| error.message().contains("duplicate key"));
+        let (message, remedy) = single.or(usual).map_or_else(
+            || (error.message().to_owned(), None),
+            |(what, remedy)| (what, Some(remedy)),
+        );
         InputErrorKind::Syntax { message, near_text, remedy }
     }
 }
@@ -117,6 +119,24 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
     } else {
         None
     }
+}
+
+/// Returns the mistake that the first element of a list has one bracket, where the list goes on in
+/// the line at the error; `None` if the text before holds no such header.
+fn single_brackets(
+    previous_lines: &str,
+    before: &str,
+    after: &str,
+) -> Option<(String, &'static str)> {
+    let list = LISTS.iter().find(|list| {
+        after.trim_start().strip_prefix(*list).is_some_and(|rest| rest.starts_with(']'))
+    })?;
+    let is_single = |line: &str| line.trim_start().starts_with(&format!("[{list}]"));
+    let line = previous_lines.lines().position(is_single)?;
+    let remedy = "write two brackets for each joint, effect and the like, the first one too, as in [[joint]]";
+    before.trim_start().starts_with("[[").then(|| {
+        (format!("line {} begins the first {list} with one bracket, [{list}]", line + 1), remedy)
+    })
 }
 
 /// Returns true if the first word of a key is followed by more words, and then by an equals sign.

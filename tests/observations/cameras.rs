@@ -350,6 +350,20 @@ fn a_point_behind_the_camera_is_an_error_with_its_row() {
     assert!(error.contains(':') && line > 1, "{error}");
 }
 
+#[test]
+fn a_camera_and_a_marker_that_both_stand_still_are_an_error() {
+    let problem = problem(CAMERAS);
+    let head = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,camera,marker,point,u_px,v_px\n";
+    let still = "0,1,-1.6,0,0.9,0,wall,board,0,1,1\n";
+    let said = table_error(&problem, &format!("{head}{still}{still}"));
+    assert_says(
+        &said,
+        &["no row depends on the arm", "\"wall\" and marker \"board\"", "on = \"tool\""],
+    );
+    // One view of the arm is enough.
+    read_table(&problem, &format!("{head}{still}0,1,-1.6,0,0.9,0,wall,tag,0,1,1\n"));
+}
+
 /// Splits rows as the problem says.
 pub fn split(problem: &Problem, rows: Measurements) -> Dataset {
     let split = flexcal::measurement::Split::new(problem, &rows).unwrap();

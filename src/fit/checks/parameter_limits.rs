@@ -1,6 +1,8 @@
 //! Checks of the fitted deviations from nominal against priors, the size of an arm, and the sign of
 //! compliances.
 
+use nalgebra::Vector3;
+
 use super::checked_fit::{Check, CheckedFit};
 use super::contradicted_entry::contradicted_entry;
 use super::finding::{Finding, FindingCode};
@@ -10,6 +12,7 @@ use crate::model::parameter::{JointField, Parameter, ParameterSite};
 use crate::problem::Observation;
 use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number, two_digits};
+use crate::spatial::{Frame, rotation_between};
 
 /// Largest deviation of an arm parameter from nominal, in σ of its prior, that is not reported. A
 /// normal deviation exceeds 5 σ once in two million.
@@ -129,10 +132,14 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
         let unit = STIFFNESS_UNITS.iter().find(|(factor, _)| (ratio / factor).ln().abs() < 0.2);
         let unit = unit.map_or(String::new(), |(_, unit)| format!(", as one in {unit} would be"));
         return Some(format!(
-            "the fitted stiffness is {ratio:.3} times the declared one{unit}; check its unit, then the prior"
+            "the fitted stiffness is {ratio:.3} times the declared one{unit}; check its unit, those of masses and \
+             payload_at, then the prior"
         ));
     }
     if let ParameterSite::Base { .. } = parameter.site {
+        if let Some(remedy) = euler_remedy(fit) {
+            return Some(remedy);
+        }
         return Some(
             "declare the pose of the arm's base in the measuring frame, not that of the instrument in the \
              frame of the base, or a larger σ; then check signs of joints and units"
@@ -159,6 +166,41 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
         format!(
             "if the σ of {sigma:.4}° is meant in radians ({in_radians:.2}°), write sigma_rad; otherwise \
              check axes of the measuring frame, signs of joints, and units"
+        )
+    })
+}
+
+/// Largest angle between the fitted base and the declared rotation read as Euler angles, at which
+/// they are the same: 3° \[rad\].
+const MAX_EULER_MISMATCH: f64 = 3.0 * std::f64::consts::PI / 180.0;
+
+/// Returns the remedy for Euler angles that are declared as the rotation vector of the base; `None`
+/// unless the fitted base has the rotation that these angles mean.
+fn euler_remedy(fit: &CheckedFit) -> Option<String> {
+    let declared = fit.problem.base.rotation;
+    let frame = |rotation: &Vector3<f64>| Frame::from_rotation_vector(Vector3::zeros(), rotation);
+    let read = Frame::from_xyz_rpy(&Vector3::zeros(), &declared);
+    let angle =
+        |one: &Frame<f64>, other: &Frame<f64>| rotation_between(&one.axes, &other.axes).norm();
+    let bases = fit.fitting.model.base_frames(fit.end.x.as_slice());
+    let fitted = bases.first()?;
+    let is_read = angle(&read, fitted) < MAX_EULER_MISMATCH;
+    let is_other = angle(&read, &frame(&declared)) > 2.0 * MAX_EULER_MISMATCH;
+    let shown = |vector: Vector3<f64>| {
+        vector
+            .map(f64::to_degrees)
+            .iter()
+            .map(|angle| number(*angle, 3))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let vector = rotation_between(&frame(&Vector3::zeros()).axes, &read.axes);
+    (is_read && is_other).then(|| {
+        format!(
+            "rotation_deg of [base] is a rotation vector; [{}] fits as Euler angles (roll, pitch, yaw), which are \
+             rotation_deg = [{}]",
+            shown(declared),
+            shown(vector)
         )
     })
 }
