@@ -77,7 +77,7 @@ pub fn after_fit(
             common.problem_file().display()
         ),
         None if found.has(FindingCode::LensContradicted) => format!(
-            "free the intrinsics in [parameters] of {}, as in \"camera*.f*\" = {{ free = true }}, then flexcal identify {named}",
+            "free the intrinsics in [parameters] of {} as the warning says, then flexcal identify {named}",
             common.problem_file().display()
         ),
         None if found.has(FindingCode::PositionsComputed) => {

@@ -34,7 +34,8 @@ pub enum InputErrorKind {
     )]
     TruthMissing,
     #[error(
-        "no such file: {}; paths in `files` are relative to the problem's folder{}",
+        "no such file: {}; paths in `files` are relative to the problem's folder{}; before \
+         anything is measured, flexcal plan chooses poses",
         path.display(),
         windows_path_hint(path)
     )]

@@ -86,7 +86,8 @@ pub enum UrdfErrorKind {
     #[error("the chain has {found} joints; at most {most}")]
     TooManyJoints { found: usize, most: usize },
     #[error(
-        "the URDF moves joints {} between \"{base}\" and \"{tip}\", the problem {}",
+        "the URDF moves joints {} between \"{base}\" and \"{tip}\", the problem {}; give the URDF of which \
+         flexcal init made the problem",
         found.join(", "), expected.join(", ")
     )]
     OtherJoints { base: String, tip: String, found: Vec<String>, expected: Vec<String> },
@@ -101,7 +102,10 @@ pub enum UrdfErrorKind {
          with the link of that joint as --tip"
     )]
     NoRoom { joint: String, off: String },
-    #[error("not an arm with the joint layout of Universal Robots: {why}")]
+    #[error(
+        "not an arm with the joint layout of Universal Robots: {why}; --format mdh or dh writes the table of \
+         any arm, ros-yaml the offsets for ROS, and --urdf ARM.urdf a URDF"
+    )]
     NotUr { why: String },
 }
 

@@ -95,7 +95,7 @@ pub enum WarningKind {
     MonthFirst { value: String, read: String },
     #[error(
         "equal to {first} in all digits{}; measurements do not repeat so exactly, and a copied \
-         row counts twice",
+         row counts twice: leave the copies out",
         repeated_rows(*rows, others)
     )]
     RowsRepeated { rows: usize, first: String, others: Vec<String> },

@@ -112,7 +112,7 @@ pub enum SavedEstimateError {
     NotIdentified { file: PathBuf, column: &'static str, word: String, known: Vec<String> },
     #[error("{}: the table has no column {column}{}; add the column, which says whose base or tool holds", file.display(), identified(known))]
     NoSuchColumn { file: PathBuf, column: &'static str, known: Vec<String> },
-    #[error("{}: identifies problem {found}, not {expected}", file.display())]
+    #[error("{}: identifies problem {found}, not {expected}; give the estimate.json that flexcal identify wrote for {expected}, or the problem {found}", file.display())]
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error("{}: {name} is {} nominally there, {} in the problem; identify again", file.display(), rounded(*found), rounded(*expected))]
     OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },

@@ -110,7 +110,20 @@ pub(in crate::fit) fn lens_finding(
         words.collect::<Vec<_>>().join(", ")
     );
     let numbers = [json!(names), json!(before), json!(after)];
-    Some(Finding::new(FindingCode::LensContradicted, numbers, text))
+    let remedy =
+        format!("free them in [parameters] ({}), or declare better ones", rules_in_words(&fixed));
+    Some(Finding::new(FindingCode::LensContradicted, numbers, text).with_remedy(remedy))
+}
+
+/// Returns the lines of `[parameters]` that free the intrinsics `names`, one for each kind of
+/// number: focal lengths, centre, radial and tangential distortion.
+fn rules_in_words(names: &[String]) -> String {
+    let kind = |name: &String| name.rsplit('.').next().and_then(|field| field.chars().next());
+    let mut kinds: Vec<char> = names.iter().filter_map(kind).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    let rules = kinds.iter().map(|kind| format!("\"camera*.{kind}*\" = {{ free = true }}"));
+    rules.collect::<Vec<_>>().join(", ")
 }
 
 /// Returns the noise variance of pixels within views, relative to the declared one, and the degrees
