@@ -137,7 +137,13 @@ pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
 
 /// States the number of poses without an equilibrium: "3 of 50 held-out poses have no equilibrium".
 pub(super) fn without_equilibrium(of: &ErrorSummary, poses: &str) -> String {
-    let have = if of.unpredicted == 1 { "has" } else { "have" };
+    let is_image = kind_named(of.kind).unit == Unit::Pixel;
+    let have = match (is_image, of.unpredicted) {
+        (true, 1) => "lies behind the camera or has",
+        (true, _) => "lie behind the camera or have",
+        (false, 1) => "has",
+        (false, _) => "have",
+    };
     format!(
         "{} of {} {have} no equilibrium",
         of.unpredicted,

@@ -55,10 +55,14 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
                 if chi2 > 1.0 { ("larger", "explains") } else { ("smaller", "predicts") };
             format!(
                 "Reduced χ² (χ²/ν) is {}; {}: the residual is {size} than the declared σ {what}.\n\
-                 Standard errors assume the declared σ, because the data do not clearly contradict \
-                 it.",
+                 Standard errors assume the declared σ, because {}.",
                 format_chi2(chi2),
                 expected_interval(found),
+                if found.is_trusted() {
+                    "the data do not clearly contradict it"
+                } else {
+                    "another σ would not mend what the warnings name"
+                }
             )
         }
     }
