@@ -107,7 +107,7 @@ const OF_TABLE: [FindingCode; 4] = [
 ];
 
 /// Codes of findings that name a mistake of the input.
-const MISTAKES: [FindingCode; 6] = [
+const MISTAKES: [FindingCode; 7] = [
     FindingCode::Misread,
     FindingCode::ViewsReversed,
     FindingCode::ColumnDoubted,
@@ -219,9 +219,7 @@ fn state_explanations(findings: &mut [Finding]) {
         return;
     }
     let suspect = format!("check first for {}", words.join(", or "));
-    let is_of_misfit = |found: &&mut Finding| {
-        [FindingCode::MissesMeasurements, FindingCode::NoBetterThanNominal].contains(&found.code)
-    };
+    let is_of_misfit = |found: &&mut Finding| FAR_OFF.contains(&found.code);
     for finding in findings.iter_mut().filter(is_of_misfit) {
         let remedy = format!(
             "{suspect}, with which the nominal arm misses far less; otherwise {}",
