@@ -4,13 +4,13 @@ from os import PathLike
 from typing import Literal, TypeAlias
 
 from ._progress import Step
-from ._restored import Prior
+from ._restored import Prior, Sibling
 from ._tables import Region, Source
 
 _Pages: TypeAlias = tuple[str, str, list[tuple[str, str]]]
 
 def command_line(arguments: list[str]) -> int: ...
-def fleet(estimates: list[Prior]) -> tuple[str, str]: ...
+def fleet(estimates: list[Sibling]) -> tuple[str, str]: ...
 def check(
     problem: Problem,
     measured: Poses | None,

@@ -14,7 +14,7 @@ from . import _html, _plots
 from ._applied import Compensation, Export
 from ._forward import _Bounded, Forward, Levels, Prediction
 from ._frames import compared_frame, effects_frame, errors_frame, parameters_frame, residuals_frame
-from ._restored import Prior, Restored, Spec, said
+from ._restored import Prior, Restored, Sibling, Spec, said
 from ._result import Array, Result, once
 from ._tables import Data, Path, asked, region, source, warn
 from .errors import InputError
@@ -407,12 +407,18 @@ class ClosedLoop(Fit):
         return _html.closed_loop(self)
 
 
-def estimate(arm: Path | Identification | ClosedLoop, name: str) -> Prior:
+def estimate(arm: Path | Identification | ClosedLoop, name: str) -> Sibling:
     """What the extension module takes as an estimate: a file, or the name and the text of one in memory."""
+    earlier = earlier_estimate(arm, name)
+    return earlier if isinstance(earlier, str) else earlier[:2]
+
+
+def earlier_estimate(arm: Path | Identification | ClosedLoop, name: str) -> Prior:
+    """What the extension module takes as a prior: a file, or the name and the text of an estimate in memory and the text of its remainder."""
     if isinstance(arm, ClosedLoop):
-        return name, arm.after.to_json()
+        arm = arm.after
     if isinstance(arm, Identification):
-        return name, arm.to_json()
+        return name, arm.to_json(), arm.remainder_json()
     if not isinstance(arm, (str, os.PathLike)):
         raise TypeError(f"an identification, a loop or the path of an estimate.json is needed, not {type(arm).__name__}")
     return os.fspath(arm)

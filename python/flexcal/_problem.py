@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._designs import Check, Next, Plan, Simulation, Study
-from ._fits import ClosedLoop, Comparison, Identification, Trace, estimate
+from ._fits import ClosedLoop, Comparison, Identification, Trace, earlier_estimate
 from ._forward import Forward
 from ._least_squares import LeastSquares
 from ._progress import Told, told
@@ -184,7 +184,7 @@ class Problem(Forward):
         given = self._given_data(data)
         read = self._read(given)
         with told(progress) as step:
-            earlier = None if prior is None else estimate(prior, "estimate.json")
+            earlier = None if prior is None else earlier_estimate(prior, "estimate.json")
             core = self._core.identify(read, strategy, solver, remainder, earlier, drift_days, step)
         spec = Spec("identify", self, given, strategy, solver, remainder, prior=earlier, drift_days=drift_days)
         result = Identification(core, self, spec)

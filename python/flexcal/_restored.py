@@ -10,8 +10,10 @@ from ._tables import Source
 if TYPE_CHECKING:
     from ._problem import Problem
 
-Prior: TypeAlias = "str | tuple[str, str]"
-"""A prior as the extension module takes it: a file, or the name and the text of an estimate."""
+Sibling: TypeAlias = "str | tuple[str, str]"
+"""An estimate as the extension module takes it: a file, or the name and the text of one."""
+Prior: TypeAlias = "str | tuple[str, str, str | None]"
+"""A prior as the extension module takes it: a file, or the name and the text of an estimate and the text of its remainder."""
 
 
 class Spec(NamedTuple):

@@ -12,14 +12,13 @@ use crate::error::{of_argument, raised};
 use crate::outcome::Identification;
 use crate::pool::detached;
 
-/// Prior of an identification: a file, or the estimate.json of an identification in memory with the
-/// name that messages give it.
+/// Prior of an identification: a file, or an identification in memory.
 #[derive(FromPyObject)]
 pub enum Prior {
     /// An estimate.json, or a PRIOR.toml.
     File(PathBuf),
-    /// Name and text of an estimate.json.
-    Estimate(PathBuf, String),
+    /// Name that messages give to an estimate.json, its text, and that of its remainder.json.
+    Estimate(PathBuf, String, Option<String>),
 }
 
 impl Prior {
@@ -30,7 +29,13 @@ impl Prior {
                 return Ok(PriorSource::Fleet(FleetPrior::read(&file)?));
             }
             Self::File(file) => SavedEstimate::read(&file)?,
-            Self::Estimate(name, text) => SavedEstimate::parse(&text, &name)?,
+            Self::Estimate(name, text, remainder) => {
+                let estimate = SavedEstimate::parse(&text, &name)?;
+                match remainder {
+                    Some(text) => estimate.with_remainder(text),
+                    None => estimate,
+                }
+            }
         };
         Ok(PriorSource::Estimate(Box::new(estimate)))
     }

@@ -7,7 +7,7 @@ use flexcal::fit::{
     self, CompareOptions, IdentifyError, Options, Placement, ResidualFunction, SolverChoice,
     Strategy,
 };
-use flexcal::life::{PriorError, identify_with_prior};
+use flexcal::life::{PriorError, update};
 use flexcal::model::Model;
 use flexcal::nalgebra::DVector;
 use flexcal::problem::{Joint, JointKind};
@@ -149,7 +149,7 @@ impl Problem {
             return Err(of_argument("drift_days", message));
         }
         if prior.is_some() && remainder {
-            let message = "remainder: a fit with a prior has none".to_owned();
+            let message = "remainder: a fit with a prior takes over that of the prior".to_owned();
             return Err(of_argument("remainder", message));
         }
         let prior = prior.map(|prior| detached(py, || prior.read())).transpose()?.transpose();
@@ -173,8 +173,8 @@ impl Problem {
                     .with_solver(solver)
                     .with_progress(sink);
                 if let Some(prior) = prior {
-                    let found = identify_with_prior(&problem, &data, &options, &prior, drift_days)?;
-                    return Ok((found, None));
+                    let updated = update(&problem, &data, &options, &prior, drift_days)?;
+                    return Ok((updated.found, updated.predictions));
                 }
                 let found = fit::identify(&problem, &data, &options)?;
                 let fitted = match (remainder, declared) {
@@ -189,9 +189,12 @@ impl Problem {
         })?;
         let (found, fitted) = found.map_err(|error| raised(&error))?;
         let identified = Identification::plain(&problem, &data, Arc::new(found));
-        // The uncertainty of predictions would count the new rows alone.
         if has_prior {
-            return Ok(Identification { fitted: OnceLock::from(None), ..identified });
+            // Without that of the prior, the uncertainty of predictions would be that of the new
+            // rows alone.
+            let is_corrected = fitted.as_ref().is_some_and(|fitted| fitted.remainder.is_some());
+            let fitted = OnceLock::from(fitted.map(Arc::new));
+            return Ok(Identification { fitted, is_corrected, ..identified });
         }
         Ok(if is_corrected { identified.corrected(fitted.map(Arc::new)) } else { identified })
     }

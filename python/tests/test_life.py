@@ -9,6 +9,7 @@ from typing import Any
 
 import flexcal
 import numpy as np
+import pandas as pd
 import pytest
 from conftest import Command
 
@@ -115,10 +116,38 @@ def test_an_earlier_identification_as_prior(arm: Sessions, command: Command) -> 
     assert (again.predict(q_deg=[10, 20, -30]) == found.predict(q_deg=[10, 20, -30])).all()
     with pytest.raises(flexcal.InputError, match="none is given"):
         arm.problem.identify(rows, drift_days=7)
-    with pytest.raises(flexcal.InputError, match="a fit with a prior has none"):
+    with pytest.raises(flexcal.InputError, match="takes over that of the prior"):
         arm.problem.identify(rows, prior=arm.identified, remainder=True)
     with pytest.raises(flexcal.InputError, match=r"absent\.json"):
         arm.problem.identify(rows, prior=arm.folder / "absent.json")
+
+
+def test_a_prior_in_memory_keeps_its_remainder(arm: Sessions, tmp_path: Path) -> None:
+    angles, axes = ["q1_deg", "q2_deg", "q3_deg"], ["x_mm", "y_mm", "z_mm"]
+
+    def bent(poses: int, seed: int) -> pd.DataFrame:
+        """Measures the arm whose joint 2 errs by waves of its command."""
+        table = pd.read_csv(arm.measured(poses, seed))
+        commands = table[angles].to_numpy(dtype=float)
+        turned = commands + np.array([0, 0.05, 0]) * np.sin(np.deg2rad(7 * commands))
+        table[axes] += 1e3 * (arm.identified.predict(q_deg=turned) - arm.identified.predict(q_deg=commands))
+        return table
+
+    def missed(fit: flexcal.Identification, table: pd.DataFrame) -> float:
+        predicted = fit.predict(q_deg=table[angles].to_numpy(dtype=float))
+        return float(np.linalg.norm(table[axes].to_numpy(dtype=float) - 1e3 * predicted, axis=1).mean())
+
+    earlier = arm.problem.identify(bent(80, 30), remainder=True)
+    text = earlier.remainder_json()
+    assert text is not None
+    found = arm.problem.identify(bent(5, 31), prior=earlier)
+    assert found.remainder_json() is not None
+    (tmp_path / "estimate.json").write_text(earlier.to_json())
+    (tmp_path / "remainder.json").write_text(text)
+    of_file = arm.problem.identify(bent(5, 31), prior=tmp_path / "estimate.json")
+    assert timeless(of_file.remainder_json() or "") == timeless(found.remainder_json() or "")
+    others = bent(60, 32)
+    assert missed(found, others) < 1.15 * missed(earlier, others)
 
 
 def test_fleet(arm: Sessions, command: Command) -> None:

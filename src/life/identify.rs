@@ -65,26 +65,6 @@ impl PriorSource {
     }
 }
 
-/// Fits the identification rows of `data` with a prior, the posterior of an earlier estimate or
-/// that of a fleet, widened by the drift of `days` days.
-///
-/// Identification and held-out rows to which the earlier estimate was fitted are left out, because
-/// the prior contains them. If the new rows contradict the prior, the prior of the most probable
-/// cause's parameters is widened, and the fit is repeated.
-///
-/// # Errors
-/// Returns an error if the estimate is of another arm or has other laws, if no row is new, or if
-/// the fit fails.
-pub fn identify_with_prior(
-    problem: &Problem,
-    data: &Dataset,
-    options: &Options,
-    source: &PriorSource,
-    days: f64,
-) -> Result<Identification, PriorError> {
-    identified(problem, data, options, (source, None), days).map(|identified| identified.found)
-}
-
 /// Identification with a prior, and what changed since the prior.
 pub(super) struct Identified {
     pub found: Identification,
@@ -94,11 +74,17 @@ pub(super) struct Identified {
     pub since: ChangedSince,
 }
 
-/// Fits rows as [`identify_with_prior`] does. With the remainder of the earlier estimate in
-/// `corrections`, the new rows are tested against its corrected predictions.
+/// Fits the identification rows of `data` with a prior, the posterior of an earlier estimate or
+/// that of a fleet, widened by the drift of `days` days.
+///
+/// Identification and held-out rows to which the earlier estimate was fitted are left out, because
+/// the prior contains them. If the new rows contradict the prior, the prior of the most probable
+/// cause's parameters is widened, and the fit is repeated. With the remainder of the earlier
+/// estimate in `corrections`, the new rows are tested against its corrected predictions.
 ///
 /// # Errors
-/// Returns the errors of [`identify_with_prior`].
+/// Returns an error if the estimate is of another arm or has other laws, if no row is new, or if
+/// the fit fails.
 pub(super) fn identified(
     problem: &Problem,
     data: &Dataset,

@@ -19,12 +19,14 @@ pub struct Update {
     pub leaves_remainder: bool,
 }
 
-/// Fits rows as [`identify_with_prior`](super::identify_with_prior) does, and carries the remainder
-/// of the earlier estimate and the uncertainty of its predictions over to the new one.
+/// Fits the identification rows of `data` that are new, with the posterior of an earlier estimate
+/// or of a fleet as prior, widened by the drift of `days` days. If the rows contradict the prior,
+/// that of the most probable cause's parameters is widened. The remainder of the earlier estimate
+/// and the uncertainty of its predictions are carried over.
 ///
 /// # Errors
-/// Returns the errors of [`identify_with_prior`](super::identify_with_prior), and an error if the
-/// remainder of the earlier estimate cannot be read.
+/// Returns an error if the estimate is of another arm or has other laws, if its remainder cannot be
+/// read, if no row is new, or if the fit fails.
 pub fn update(
     problem: &Problem,
     data: &Dataset,

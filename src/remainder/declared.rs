@@ -53,7 +53,11 @@ pub fn of_estimate(
     }
     if let Some(name) = estimate.remainder.as_ref().filter(|_| problem.remainder.is_none()) {
         let file = estimate.file.with_file_name(name);
-        let correction = read(problem, &file, estimate.changes)?;
+        let correction = match &estimate.remainder_text {
+            Some(text) => Correction::parse(text, &file)?,
+            None => Correction::read(&file, estimate.changes)?,
+        };
+        correction.check(problem, &file)?;
         if estimate.changes == Changes::Refused {
             correction.check_estimate(estimate, &file)?;
         }

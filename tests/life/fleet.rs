@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::fit::{Options, SavedEstimate};
-use flexcal::life::{FleetPrior, PriorError, PriorSource, fleet, identify_with_prior};
+use flexcal::life::{FleetPrior, PriorError, PriorSource, fleet, update};
 use flexcal::problem::Problem;
 use flexcal::results::Document as _;
 
@@ -55,7 +55,7 @@ pub fn errors(bench: &Bench, number: u64, arms: u64) -> (f64, f64) {
     let arm = sibling(bench, number, 99);
     let rows = bench.measure(&arm, 6, 60_000 + number, 1.0);
     let options = Options::default();
-    let found = identify_with_prior(&bench.problem, &whole(&rows), &options, &prior, 0.0).unwrap();
+    let found = update(&bench.problem, &whole(&rows), &options, &prior, 0.0).unwrap().found;
     (bench.error(&found, &arm), bench.error(&bench.calibrate(&rows), &arm))
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::fit::{FindingCode, Identification, Options, SavedEstimate};
-use flexcal::life::{PriorError, PriorSource, identify_with_prior};
+use flexcal::life::{PriorError, PriorSource, update};
 use flexcal::measurement::{Dataset, Split};
 use flexcal::report::estimate_text;
 use flexcal::results::{Document as _, IdentificationResult};
@@ -24,7 +24,7 @@ pub fn again(bench: &Bench, seed: u64, poses: usize, zero: f64) -> (f64, f64, Id
     let changed = with_zero(&arm, 2, zero);
     let rows = bench.measure(&changed, poses, 5000 + seed, 1.0);
     let options = Options::default();
-    let found = identify_with_prior(&bench.problem, &whole(&rows), &options, &prior, 1.0).unwrap();
+    let found = update(&bench.problem, &whole(&rows), &options, &prior, 1.0).unwrap().found;
     (bench.error(&full, &arm), bench.error(&found, &changed), found)
 }
 
@@ -68,7 +68,7 @@ fn earlier_rows_are_not_counted_twice() {
     let estimate = bench.saved(&full, &rows.select(&(0..FULL).collect::<Vec<_>>()));
     let prior = PriorSource::Estimate(Box::new(estimate));
     let run = |data: &Dataset| {
-        identify_with_prior(&bench.problem, data, &Options::default(), &prior, 0.0)
+        update(&bench.problem, data, &Options::default(), &prior, 0.0).map(|update| update.found)
     };
     let new = rows.select(&(FULL..FULL + 5).collect::<Vec<_>>());
     let (all, only_new) = (run(&whole(&rows)).unwrap(), run(&whole(&new)).unwrap());
@@ -114,7 +114,7 @@ fn the_noise_of_the_first_fit_is_kept() {
         let estimate = SavedEstimate::parse(&text, Path::new("first.json")).unwrap();
         let prior = PriorSource::Estimate(Box::new(estimate));
         let new = whole(&measured(6, 600));
-        let found = identify_with_prior(&problem, &new, &Options::default(), &prior, 0.0).unwrap();
+        let found = update(&problem, &new, &Options::default(), &prior, 0.0).unwrap().found;
         let text = IdentificationResult::new(&problem, &found).to_json();
         let [first, second] = [first.sigma_taken, found.sigma_taken];
         assert!(second > 0.999 * first, "{first} {second}");

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::fit::{Finding, FindingCode, Identification, Options, SavedEstimate, identify};
-use flexcal::life::{CauseKind, PriorSource, identify_with_prior, watch};
+use flexcal::life::{CauseKind, PriorSource, update, watch};
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::problem::Problem;
 use flexcal::results::{Document as _, IdentificationResult};
@@ -90,8 +90,7 @@ fn a_board_that_was_put_down_again_is_named_and_leaves_the_arm() {
         assert!(!watched.causes.iter().any(|cause| is_base(cause.kind)), "{shift}");
         let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
         let data = Dataset::new(rows, split);
-        let updated =
-            identify_with_prior(problem, &data, &Options::default(), &source, 0.0).unwrap();
+        let updated = update(problem, &data, &Options::default(), &source, 0.0).unwrap().found;
         let is_contradiction =
             |finding: &&Finding| finding.code == FindingCode::EarlierEstimateContradicted;
         let causes: Vec<String> = updated

@@ -45,6 +45,8 @@ pub struct SavedEstimate {
     pub start_times: Option<StartTimes>,
     /// Name of the `remainder.json` in the same folder; `None` if no remainder was accepted.
     pub remainder: Option<String>,
+    /// Text of the remainder, if it is in no file.
+    pub(crate) remainder_text: Option<String>,
     /// Measurement files of the fit, as its command named them; empty if the file names none.
     pub measurement_files: Vec<PathBuf>,
     /// Section on the uncertainty of predictions, as JSON text; `None` in files of older versions.
@@ -265,6 +267,7 @@ impl SavedEstimate {
             start_times: first_time_s
                 .map(|first| StartTimes { first, sessions: session_times_s.unwrap_or_default() }),
             remainder: remainder.and_then(|result| result.file),
+            remainder_text: None,
             measurement_files: measurement_files.unwrap_or_default(),
             prediction: prediction.map(|result| result.get().to_owned()),
             problem,
@@ -283,6 +286,13 @@ impl SavedEstimate {
             },
             parameters,
         })
+    }
+
+    /// Returns the estimate with the text of its `remainder.json`, which then is in no file.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_remainder(self, text: String) -> Self {
+        Self { remainder_text: Some(text), ..self }
     }
 
     /// Returns the model that the saved strategy fitted, derived from the `declared` model.
