@@ -10,6 +10,7 @@ use super::placement_fit::PlacementFit;
 use super::posterior::{Posterior, RowFactors, RowPosterior};
 use super::rows::{AXES, Layout, Rows, SiteKind};
 use super::scores::{Scores, applied_share, expected_size};
+use super::training_rows::TrainingRows;
 use crate::fit::Identification;
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
@@ -89,12 +90,11 @@ impl CorrectedPose {
 }
 
 impl Correction {
-    /// Creates the correction of the arm identified in `found`, whose free parameters have the
-    /// indices `unknowns`.
+    /// Creates the correction of the arm identified in `found`, which was conditioned on the
+    /// training rows.
     pub(super) fn new(
-        found: &Identification,
-        problem: &Problem,
-        (layout, unknowns): (&Layout, &[usize]),
+        (found, problem): (&Identification, &Problem),
+        TrainingRows { layout, unknowns, sigma, .. }: &TrainingRows,
         Conditioned { posterior, scores }: Conditioned,
     ) -> Self {
         let mut layout = layout.clone();
@@ -110,7 +110,7 @@ impl Correction {
         Self {
             problem: problem.name.clone(),
             arm_digest: problem.digest(),
-            sigma: found.sigma,
+            sigma: *sigma,
             layout,
             parameters: unknowns.iter().map(parameter).collect(),
             posterior,

@@ -135,9 +135,7 @@ fn fitted(
     let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let Some(training) = training_rows(found, problem, &model, data) else { return Ok(None) };
     let Some(judged) = judge(&training, is_remainder_wanted) else { return Ok(None) };
-    let correction = |conditioned| {
-        Correction::new(found, problem, (&training.layout, &training.unknowns), conditioned)
-    };
+    let correction = |conditioned| Correction::new((found, problem), &training, conditioned);
     let alone = correction(judged.alone);
     let remainder = judged.remainder.map(correction);
     let residuals = remainder.as_ref().map(|kept| residuals(found, problem, data, kept));
@@ -169,8 +167,10 @@ fn training_rows(
         estimate.fitted && estimate.at_bound.is_none()
     };
     let unknowns = (0..found.estimates.len()).filter(is_free).collect();
-    let mut linearisation =
-        Linearisation { problem, model, x: &found.x, unknowns, sigma: found.sigma };
+    // With it, the noise of the rows is near the scatter of their residuals, where its search begins.
+    let squares: f64 = poses.iter().map(|pose| pose.sigma.powi(2)).sum();
+    let sigma = (squares / poses.len().max(1) as f64).sqrt();
+    let mut linearisation = Linearisation { problem, model, x: &found.x, unknowns, sigma };
     let layout = linearisation.layout(&poses);
     let mut rows = linearisation.rows(&layout, poses);
     let (slopes, lengths) = linearisation.whitened(distances);
@@ -186,7 +186,7 @@ fn training_rows(
     let prior = prior(model, &found.x, &linearisation.unknowns, &rows)
         .with_distances(&slopes.select_columns(&seen), &lengths);
     let unknowns = (layout, linearisation.unknowns);
-    let training = TrainingRows::new(unknowns, rows, prior);
+    let training = TrainingRows::new(unknowns, rows, (prior, sigma));
     let suffices = training.configurations.len() >= MIN_CONFIGURATIONS && training.size > 0.0;
     (is_usable && suffices).then_some(training)
 }

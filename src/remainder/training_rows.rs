@@ -25,6 +25,8 @@ pub(super) struct TrainingRows {
     /// Indices of the free parameters that affect these rows.
     pub unknowns: Vec<usize>,
     pub rows: Rows,
+    /// Unit of the rows' relative σ: root mean square of their σ \[m\].
+    pub sigma: f64,
     pub prior: ParameterPrior,
     /// Root mean square length of a residual \[m\].
     pub size: f64,
@@ -40,12 +42,13 @@ impl TrainingRows {
     pub fn new(
         (layout, unknowns): (Layout, Vec<usize>),
         rows: Rows,
-        prior: ParameterPrior,
+        (prior, sigma): (ParameterPrior, f64),
     ) -> Self {
         let size = (rows.residual.norm_squared() / rows.len().max(1) as f64).sqrt();
         let configurations = rows.configurations();
         let judged = Vec::new();
-        let mut training = Self { layout, unknowns, rows, prior, size, configurations, judged };
+        let mut training =
+            Self { layout, unknowns, rows, sigma, prior, size, configurations, judged };
         training.judged = training.some_rows(MAX_JUDGED_ROWS, 3);
         training
     }
@@ -97,26 +100,37 @@ impl TrainingRows {
     }
 
     /// Estimates the noise of a model without a remainder. σ² is the variance of the residuals
-    /// within configurations, and σ_c² the variance of all residuals minus σ².
+    /// within configurations, each in units of the row's relative σ. σ_c² is what then remains of
+    /// the variance of all residuals.
     pub fn noise(&self) -> Hyperparameters {
+        let relative = |row: usize| self.rows.relative_sigma[row];
         let coordinate = |row: usize, axis: usize| self.rows.residual[AXES * row + axis];
         let coordinates = (AXES * self.rows.len()) as f64;
         let freedom = (coordinates - self.unknowns.len() as f64).max(1.0);
-        let whole = self.rows.residual.norm_squared() / freedom;
+        let sum_over = |of: &dyn Fn(usize, usize) -> f64| -> f64 {
+            (0..self.rows.len()).map(|row| (0..AXES).map(|axis| of(row, axis)).sum::<f64>()).sum()
+        };
+        let relative_variance =
+            sum_over(&|row, axis| (coordinate(row, axis) / relative(row)).powi(2)) / freedom;
         if !self.shares_noise() {
-            return Hyperparameters::without_remainder(whole.sqrt(), 0.0);
+            return Hyperparameters::without_remainder(relative_variance.sqrt(), 0.0);
         }
         let mut within = 0.0;
         for rows in &self.configurations {
+            // The mean is weighted by the precision of the rows.
+            let weight = |row: usize| relative(row).powi(-2);
+            let weights: f64 = rows.iter().map(|&row| weight(row)).sum();
             for axis in 0..AXES {
-                let mean = rows.iter().map(|&row| coordinate(row, axis)).sum::<f64>();
-                let mean = mean / rows.len() as f64;
-                within +=
-                    rows.iter().map(|&row| (coordinate(row, axis) - mean).powi(2)).sum::<f64>();
+                let sum = rows.iter().map(|&row| weight(row) * coordinate(row, axis)).sum::<f64>();
+                let deviation = |row: usize| coordinate(row, axis) - sum / weights;
+                within += rows.iter().map(|&row| weight(row) * deviation(row).powi(2)).sum::<f64>();
             }
         }
         let repeated = AXES * (self.rows.len() - self.configurations.len());
-        let within = (within / repeated.max(1) as f64).clamp(MIN_NOISE_SHARE * whole, whole);
-        Hyperparameters::without_remainder(within.sqrt(), (whole - within).sqrt())
+        let within = (within / repeated.max(1) as f64)
+            .clamp(MIN_NOISE_SHARE * relative_variance, relative_variance);
+        let whole = sum_over(&|row, axis| coordinate(row, axis).powi(2)) / freedom;
+        let own = sum_over(&|row, _| within * relative(row).powi(2)) / coordinates;
+        Hyperparameters::without_remainder(within.sqrt(), (whole - own).max(0.0).sqrt())
     }
 }

@@ -378,7 +378,8 @@ impl IdentificationResult {
             covariance: if found.prior.is_some() {
                 self.covariance
             } else {
-                remainder::covariance(found, fitted)
+                covariance_of_predictions(found)
+                    .unwrap_or_else(|| remainder::covariance(found, fitted))
             },
             remainder: Remainder::new(found, fitted),
             prediction: remainder::prediction(fitted),
@@ -456,6 +457,18 @@ impl Orientation {
             sigma_taken_deg: errors.sigma_taken.to_degrees(),
         }
     }
+}
+
+/// Returns the rows of the covariance of the fit, with 0 for parameters that were not fitted or rest
+/// on a bound. `None` if a fitted parameter has no standard error.
+fn covariance_of_predictions(found: &Identification) -> Option<Vec<Box<RawValue>>> {
+    let is_free = |k: usize| found.estimates[k].fitted && found.estimates[k].at_bound.is_none();
+    let n = found.estimates.len();
+    let is_known = (0..n).filter(|k| is_free(*k)).all(|k| found.estimates[k].std_error.is_some());
+    let entry = |j: usize, k: usize| {
+        if is_free(j) && is_free(k) { found.covariance.entry(j, k).unwrap_or(0.0) } else { 0.0 }
+    };
+    is_known.then(|| json_rows(n, entry))
 }
 
 /// Returns the word for the active side of a bound.

@@ -80,7 +80,7 @@ fn standard_parameters_describe_the_identified_arm() {
         export("mdh", "--best-rigid --workspace-mm=-3000,3000,-3000,3000,-1000,3000");
     assert_ne!(best, modified);
     let said = said.replace('\n', " ");
-    let line = &said[said.find("In the workspace").unwrap()..];
+    let line = &said[said.find("differs from the exported geometry").unwrap()..];
     let values: Vec<f64> = line.split([' ', '(']).filter_map(|word| word.parse().ok()).collect();
     assert!(values[0] < 0.9 * values[2], "{line}");
     // A rigid arm fitted to the measured poses is nearer to them, and the next command says so.

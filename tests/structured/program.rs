@@ -142,7 +142,8 @@ pub fn files_agree(fit: &Fitted, folder: &Path) -> Verdict {
 }
 
 /// Keys of estimate.json that differ from run to run, or by how the files are named.
-const MAY_DIFFER: [&str; 6] = ["seconds", "digest", "file", "cautions", "text", "remedy"];
+const MAY_DIFFER: [&str; 7] =
+    ["seconds", "digest", "file", "measurement_files", "cautions", "text", "remedy"];
 
 /// Returns the path of the first value that differs.
 fn first_difference(one: &Value, other: &Value) -> Option<String> {
