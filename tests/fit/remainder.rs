@@ -94,6 +94,33 @@ fn smooth_errors_of_joints_are_corrected_and_bounded() {
 }
 
 #[test]
+fn the_declared_sigma_changes_nothing_beside_a_column_of_sigma() {
+    let problem = panda();
+    let file = path("problems/panda/problem.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let other = text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 1.0");
+    assert_ne!(other, text);
+    let other = Problem::parse(&other, &file).unwrap();
+    let table = csv(&problem, &measured(&problem, 3e-4, 5));
+    let mut lines = table.lines();
+    let header = format!("{},sigma_mm", lines.next().unwrap());
+    let table = lines.fold(header, |table, line| format!("{table}\n{line},0.02"));
+    let [one, two] =
+        [&problem, &other].map(|problem| fitted(problem, &read_dataset(problem, &table)));
+    let gains = [&one, &two].map(|(_, fitted)| fitted.gain.unwrap());
+    assert!((gains[0].ln_evidence - gains[1].ln_evidence).abs() < 1e-6, "{gains:?}");
+    assert!((gains[0].density.mean - gains[1].density.mean).abs() < 1e-6);
+    let joints = [&one, &two].map(|(_, fitted)| fitted.remainder.as_ref().unwrap().joints());
+    assert_eq!(joints[0], joints[1]);
+    // Left-out errors are as large as they are expected to be.
+    let json = IdentificationResult::new(&other, &two.0).with_predictions(&two.0, &two.1).to_json();
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let scores = json["prediction"]["scores"]["single"].as_array().unwrap();
+    let squares: f64 = scores.iter().map(|score| score.as_f64().unwrap().powi(2)).sum();
+    assert!((0.8..1.25).contains(&(squares / scores.len() as f64).sqrt()), "{squares}");
+}
+
+#[test]
 fn commands_bring_the_corrected_arm_to_its_targets() {
     let problem = panda();
     let data = measured(&problem, 3e-4, 2);
