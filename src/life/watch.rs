@@ -106,9 +106,8 @@ pub fn watch(
     (days, false_alarm_rate): (f64, f64),
 ) -> Result<Watch, PriorError> {
     let fitted = &estimate.posterior.fitted_rows;
-    let new: Vec<usize> = (0..measurements.len())
-        .filter(|&row| !fitted.contains(&measurements.row_digest(row)))
-        .collect();
+    let new: Vec<usize> =
+        (0..measurements.len()).filter(|&row| !measurements.is_among(row, fitted)).collect();
     let left_out = measurements.len() - new.len();
     if new.is_empty() {
         return Err(PriorError::NothingNew { file: estimate.file.clone(), rows: left_out });

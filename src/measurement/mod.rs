@@ -69,6 +69,7 @@ mod table;
 mod time;
 mod unmeasured;
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -105,6 +106,9 @@ pub struct Measurements {
     /// Observation of each row; empty if all rows measure positions.
     #[doc(hidden)]
     pub observations: Vec<Observation>,
+    /// Names of the two points of each known distance, in alphabetic order, and the observation of
+    /// its row.
+    pub(crate) distance_names: Vec<(Observation, [String; 2])>,
     /// Measured numbers of each row, padded with zeros: a position in the measuring frame \[m\], a
     /// distance \[m\], tilts \[rad\] or pixels; 0 for a contact.
     pub positions: Vec<Vector3<f64>>,
@@ -330,8 +334,28 @@ impl Measurements {
 
     /// Returns a digest of a row, 16 hexadecimal digits. It is computed from joints, measured
     /// numbers, and session, target, payload and time if the table states them. It does not depend
-    /// on the file, nor on the units in which the values are written.
+    /// on the file, nor on the units in which the values are written. The digest of a known distance
+    /// is computed from its points, length and σ alone, so that it is the same with any table.
     pub(crate) fn row_digest(&self, row: usize) -> String {
+        let observation = self.observation(row);
+        let names = self.distance_names.iter().find(|(of, _)| *of == observation);
+        let Some((_, [first, second])) = names else { return self.digest_of_conditions(row) };
+        let sigma = self.sigma_of(row).unwrap_or(0.0);
+        let length = self.positions[row].x;
+        digest(&format!("known distance {length:.9e} {sigma:.9e}\n{first}\n{second}"))
+    }
+
+    /// Returns true if `digests` contains that of a row, or that of a known distance as earlier
+    /// versions wrote it.
+    pub(crate) fn is_among(&self, row: usize, digests: &HashSet<String>) -> bool {
+        digests.contains(&self.row_digest(row))
+            || (matches!(self.observation(row), Observation::Between(..))
+                && digests.contains(&self.digest_of_conditions(row)))
+    }
+
+    /// Returns the digest of a row that is no known distance. Earlier versions digested known
+    /// distances in this way, too.
+    fn digest_of_conditions(&self, row: usize) -> String {
         let orientation = self.orientation(row).map(UnitQuaternion::scaled_axis);
         let turn = orientation.iter().flat_map(|turn| turn.iter());
         let numbers = self.configuration(row).iter().chain(&self.positions[row]).chain(turn);
@@ -348,7 +372,7 @@ impl Measurements {
             .fold(text, |text, (number, name)| format!("{text} {name} {:.9e}", number + 0.0));
         let words = words.filter_map(|labels| labels.names.get(*labels.of_row.get(row)?));
         let text = words.fold(text, |text, word| format!("{text}\n{word}"));
-        hexadecimal(&text).chars().take(16).collect()
+        digest(&text)
     }
 
     /// Returns the configuration of a row, shape = (joints) \[rad\] or \[m\].
@@ -392,6 +416,7 @@ impl Measurements {
                 [] => Vec::new(),
                 observations => rows.iter().map(|&row| observations[row]).collect(),
             },
+            distance_names: self.distance_names.clone(),
             positions: rows.iter().map(|&row| self.positions[row]).collect(),
             position_measured: self.position_measured,
             position_unit: self.position_unit,
@@ -462,4 +487,9 @@ impl Measurements {
         joined.nests.extend(other.nests.iter().cloned());
         joined
     }
+}
+
+/// Returns the digest of a text, 16 hexadecimal digits.
+fn digest(text: &str) -> String {
+    hexadecimal(text).chars().take(16).collect()
 }

@@ -255,6 +255,10 @@ pub(super) fn add_known_distances(
     for distance in &problem.distances {
         if distance.between.iter().all(|point| is_located(point, &measurements.observations)) {
             measurements.add_known(distance, &problem.data.location.file);
+            let observation = measurements.observation(measurements.len() - 1);
+            let mut names = distance.between.map(|point| problem.fixtures[point].name.clone());
+            names.sort_unstable();
+            measurements.distance_names.push((observation, names));
         }
     }
     let mut kinds: Vec<&str> = Vec::new();

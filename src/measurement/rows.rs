@@ -57,6 +57,7 @@ impl RowsBuilder {
             other_configurations: has_both_joint_sources(columns).then(Vec::new),
             nests: Vec::new(),
             observations: Vec::new(),
+            distance_names: Vec::new(),
             positions: Vec::new(),
             position_measured: true,
             position_unit: columns

@@ -392,7 +392,7 @@ impl SavedEstimate {
     #[doc(hidden)]
     pub fn fitted_among(&self, table: &Measurements) -> Vec<usize> {
         let fitted = &self.posterior.fitted_rows;
-        (0..table.len()).filter(|&row| fitted.contains(&table.row_digest(row))).collect()
+        (0..table.len()).filter(|&row| table.is_among(row, fitted)).collect()
     }
 
     /// Returns name, estimated value \[SI\] and prior σ of every parameter, in the order of the
