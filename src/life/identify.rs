@@ -24,6 +24,7 @@ use crate::fit::{
 };
 use crate::measurement::{Dataset, Split};
 use crate::model::Model;
+use crate::observation::Observation;
 use crate::problem::Problem;
 use crate::quantity::Unit;
 use crate::remainder::{ChangedSince, EarlierCorrections, PredictedRows};
@@ -102,7 +103,7 @@ pub(super) fn identified(
         PriorSource::Estimate(estimate) => Earlier::of_estimate(estimate, problem, &model, days)?,
         PriorSource::Fleet(prior) => Earlier::of_fleet(prior, problem, &model, days)?,
     };
-    let is_new = |row: &usize| !original.fitted_rows.contains(&data.measurements.row_digest(*row));
+    let is_new = |row: &usize| !data.measurements.is_among(*row, &original.fitted_rows);
     let identification: Vec<usize> =
         data.split.identification.iter().copied().filter(is_new).collect();
     let held_out: Vec<usize> = data.split.held_out.iter().copied().filter(is_new).collect();
@@ -298,7 +299,14 @@ fn contradiction(
         let cause = contradicting_evidence(&test.assessed).and_then(|_| {
             most_probable(&test.assessed, (&test.causes, location), (&test.extended, &test.rows))
         });
-        return (cause.map(|cause| cause.with_place(&moved)), Some(chi2_of_rows(&test.assessed)));
+        // Rows that measure something else are tested without the remainder, together with all others.
+        let is_tested = |of: Observation| of.is_position() || of.is_point() || !of.is_of_arm();
+        let are_all_tested =
+            rows.iter().map(|row| data.measurements.observation(*row)).all(is_tested);
+        if cause.is_some() || are_all_tested {
+            let chi2 = chi2_of_rows(&test.assessed);
+            return (cause.map(|cause| cause.with_place(&moved)), Some(chi2));
+        }
     }
     let location = |row: usize| data.measurements.location(rows[row]).to_string();
     let cause = evidence

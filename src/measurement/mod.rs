@@ -108,7 +108,8 @@ pub struct Measurements {
     pub observations: Vec<Observation>,
     /// Names of the two points of each known distance, in alphabetic order, and the observation of
     /// its row.
-    pub(crate) distance_names: Vec<(Observation, [String; 2])>,
+    #[doc(hidden)]
+    pub distance_names: Vec<(Observation, [String; 2])>,
     /// Measured numbers of each row, padded with zeros: a position in the measuring frame \[m\], a
     /// distance \[m\], tilts \[rad\] or pixels; 0 for a contact.
     pub positions: Vec<Vector3<f64>>,

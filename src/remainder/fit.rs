@@ -35,10 +35,22 @@ pub struct Fitted {
     pub residuals: Option<CorrectedResiduals>,
     /// True if the remainder was read from a file that the problem names.
     pub is_declared: bool,
-    /// Factor by which error bounds of an earlier estimate were widened when they were carried over
-    /// to a new one, at least 1; `None` if the uncertainty was not carried over.
+    /// How remainder and uncertainty of an earlier estimate were carried over to this one; `None`
+    /// if they were not.
     #[doc(hidden)]
-    pub carried: Option<f64>,
+    pub carried: Option<Carried>,
+}
+
+/// How the corrections of an earlier estimate were carried over to a new one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Carried {
+    /// Factor by which the error bounds were widened, at least 1.
+    pub widening: f64,
+    /// Number of new rows that measure positions and are no outliers.
+    pub positions: usize,
+    /// Number of these rows that condition the corrections: all, some if they are very many, or
+    /// none if one of them has no finite prediction.
+    pub conditioning: usize,
 }
 
 /// Summary of the search for a remainder.
@@ -48,9 +60,9 @@ pub struct Outcome {
     pub(crate) gain: Option<Gain>,
     /// True if the remainder was read from a file that the problem names.
     pub(crate) is_declared: bool,
-    /// Factor by which error bounds were widened when remainder and uncertainty of an earlier
-    /// estimate were carried over; `None` if they were not.
-    pub(crate) carried: Option<f64>,
+    /// How remainder and uncertainty of an earlier estimate were carried over; `None` if they were
+    /// not.
+    pub(crate) carried: Option<Carried>,
     /// Number of joints whose errors the remainder corrects.
     pub(crate) joints: usize,
     /// Held-out errors with the remainder; `None` if none is kept. If no rows are held out, these
@@ -158,9 +170,12 @@ fn training_rows(
     model: &Model,
     data: &Dataset,
 ) -> Option<TrainingRows> {
-    let (rows, distances) = fitted_rows(found, data)?;
+    let FittedRows { positions, distances, others } = fitted_rows(found, data);
+    if !others.is_empty() {
+        return None;
+    }
     let times = (found.sigma, &found.start_times);
-    let poses = timed_poses(&data.measurements, &rows, times);
+    let poses = timed_poses(&data.measurements, &positions, times);
     let distances = timed_poses(&data.measurements, &distances, times);
     let is_free = |k: &usize| {
         let estimate = &found.estimates[*k];
@@ -191,23 +206,29 @@ fn training_rows(
     (is_usable && suffices).then_some(training)
 }
 
-/// Returns the identification rows that measure positions and are no outliers, above [`MAX_ROWS`]
-/// every n-th of them, and those that state a known distance. Returns `None` if some row measures
-/// something else.
-pub(super) fn fitted_rows(
-    found: &Identification,
-    data: &Dataset,
-) -> Option<(Vec<usize>, Vec<usize>)> {
+/// Identification rows without outliers, by what they measure.
+pub(super) struct FittedRows {
+    /// Indices of the rows that measure positions, above [`MAX_ROWS`] every n-th of them.
+    pub positions: Vec<usize>,
+    /// Indices of the rows that state a known distance.
+    pub distances: Vec<usize>,
+    /// Indices of the rows that measure something else.
+    pub others: Vec<usize>,
+}
+
+/// Returns the identification rows of `data` that are no outliers of `found`, by what they measure.
+pub(super) fn fitted_rows(found: &Identification, data: &Dataset) -> FittedRows {
     let outliers: HashSet<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
-    let rows = data.split.identification.iter().copied().filter(|row| !outliers.contains(row));
-    let observation = |row: &usize| data.measurements.observation(*row);
-    let is_distance = |row: &usize| matches!(observation(row), Observation::Between(..));
-    let (distances, rows): (Vec<usize>, Vec<usize>) = rows.partition(is_distance);
-    let is_position =
-        |row: &usize| matches!(observation(row), Observation::Position | Observation::Point(_));
-    if !rows.iter().all(is_position) {
-        return None;
+    let mut fitted =
+        FittedRows { positions: Vec::new(), distances: Vec::new(), others: Vec::new() };
+    for row in data.split.identification.iter().copied().filter(|row| !outliers.contains(row)) {
+        match data.measurements.observation(row) {
+            Observation::Position | Observation::Point(_) => fitted.positions.push(row),
+            Observation::Between(..) => fitted.distances.push(row),
+            _ => fitted.others.push(row),
+        }
     }
-    let step = rows.len().div_ceil(MAX_ROWS).max(1);
-    Some((rows.into_iter().step_by(step).collect(), distances))
+    let step = fitted.positions.len().div_ceil(MAX_ROWS).max(1);
+    fitted.positions = fitted.positions.into_iter().step_by(step).collect();
+    fitted
 }

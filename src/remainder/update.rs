@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::correction::{Correction, LinearisedParameter};
-use super::fit::{Fitted, fitted_rows};
+use super::fit::{Carried, Fitted, fitted_rows};
 use super::gain::Gain;
 use super::linearise::{Linearisation, prior, timed_poses};
 use super::posterior::{LeftOut, Posterior, Training};
@@ -68,8 +68,8 @@ pub(crate) struct EarlierCorrections {
 impl EarlierCorrections {
     /// Predicts at most `count` of the identification rows of `data`, evenly spaced, by the earlier
     /// estimate with its remainder. `found` is the estimate about which they are linearised.
-    /// Covariance and noise are scaled by the scores of earlier left-out rows. Returns `None`
-    /// without a remainder, or if some row measures no position.
+    /// Covariance and noise are scaled by the scores of earlier left-out rows. Rows that
+    /// measure no position are left out. Returns `None` without a remainder, or if no row is left.
     ///
     /// # Errors
     /// Returns an error if `problem` and `data` are not those that were identified.
@@ -83,7 +83,7 @@ impl EarlierCorrections {
         let placement = Placement::of(&data.measurements);
         let model = Model::new(problem, &placement.bases, &placement.targets)?;
         let model = found.strategy.model(model);
-        let (rows, _) = fitted_rows(found, data).unwrap_or_default();
+        let rows = fitted_rows(found, data).positions;
         let step = rows.len().div_ceil(count).max(1);
         let picked: Vec<usize> = rows.into_iter().step_by(step).collect();
         let update = Update { found, problem, model: &model, data, rows: &picked, since };
@@ -122,7 +122,7 @@ impl EarlierCorrections {
         let placement = Placement::of(&data.measurements);
         let model = Model::new(problem, &placement.bases, &placement.targets)?;
         let model = found.strategy.model(model);
-        let (rows, _) = fitted_rows(found, data).unwrap_or_default();
+        let rows = fitted_rows(found, data).positions;
         let update = Update { found, problem, model: &model, data, rows: &rows, since };
         let Some(mut alone) = update.of(&self.alone) else { return Ok(None) };
         let mut errors = left_out_errors(
@@ -132,6 +132,7 @@ impl EarlierCorrections {
             &alone.left_out,
         );
         let mut widening = alone.widened_bounds(since.noise_ratio, &errors);
+        let conditioning = alone.rows.len();
         let (mut remainder, mut gain) = (None, None);
         if let Some(earlier) = &self.remainder {
             let Some(mut with) = update.of(earlier) else { return Ok(None) };
@@ -151,7 +152,7 @@ impl EarlierCorrections {
             gain,
             residuals: residuals.transpose()?,
             is_declared: false,
-            carried: Some(widening),
+            carried: Some(Carried { widening, positions: rows.len(), conditioning }),
         }))
     }
 }
@@ -201,22 +202,30 @@ impl Updated {
     /// to the earlier ones if it is significant. Returns the factor.
     fn widened_bounds(&mut self, noise_ratio: f64, errors: &[LeftOutError]) -> f64 {
         let scores = &mut self.correction.scores;
-        let squares: Vec<f64> = errors
-            .iter()
-            .map(|error| error.score * error.score)
-            .filter(|square| square.is_finite())
-            .collect();
-        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
-        let ratio = scores.scale().map_or(1.0, |scale| mean / (scale * scale));
+        let configurations = self.rows.configurations();
+        let mean = mean_square_score(&configurations, errors);
+        let ratio = mean.zip(scores.scale()).map_or(1.0, |(mean, scale)| mean / (scale * scale));
         let coordinates = |count: usize| (AXES * count.max(1)) as f64;
-        let new = coordinates(self.rows.configurations().len());
+        let new = coordinates(configurations.len());
         let chance = FisherSnedecor::new(new, coordinates(scores.configurations))
             .map_or(1.0, |distribution| distribution.sf(ratio));
-        let is_larger = !squares.is_empty() && chance < FALSE_WIDENING_PROBABILITY;
+        let is_larger = mean.is_some() && chance < FALSE_WIDENING_PROBABILITY;
         let factor = noise_ratio.max(1.0) * if is_larger { ratio.sqrt() } else { 1.0 };
         scores.multiply(factor);
         factor
     }
+}
+
+/// Returns the mean over `configurations` of the mean squared score of their rows, so that repeated
+/// poses count once. `None` if no configuration has finite scores.
+fn mean_square_score(configurations: &[Vec<usize>], errors: &[LeftOutError]) -> Option<f64> {
+    let mean_of = |rows: &Vec<usize>| {
+        let squares: f64 = rows.iter().map(|&row| errors[row].score.powi(2)).sum();
+        squares / rows.len() as f64
+    };
+    let means: Vec<f64> =
+        configurations.iter().map(mean_of).filter(|mean| mean.is_finite()).collect();
+    (!means.is_empty()).then(|| means.iter().sum::<f64>() / means.len() as f64)
 }
 
 impl Update<'_> {
@@ -342,5 +351,20 @@ impl Update<'_> {
         let factor = lower_factor(precision)?;
         let inverse_factor = inverse_lower(&factor);
         Some(Posterior { prior, factor, inverse_factor, weights, ..before.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_that_is_repeated_often_does_not_decide_the_width_of_bounds() {
+        let error = |score| LeftOutError { score, ..LeftOutError::default() };
+        let mut errors = vec![error(3.0); 9];
+        errors.push(error(1.0));
+        let configurations = [(0..9).collect(), vec![9]];
+        assert_eq!(mean_square_score(&configurations, &errors), Some(5.0));
+        assert_eq!(mean_square_score(&[], &errors), None);
     }
 }

@@ -6,15 +6,15 @@ use super::document::{Block, Column, Table, code};
 use super::figures;
 use crate::fit::{ErrorSummary, Identification, Residual};
 use crate::quantity::format::{counted, mm, number, percent_of, two_digits};
-use crate::remainder::{BoundTest, Bounds, Gain, JointError, MIN_CONFIGURATIONS, Outcome};
+use crate::remainder::{BoundTest, Bounds, Carried, Gain, JointError, MIN_CONFIGURATIONS, Outcome};
 use crate::results::PlotData;
 
 /// States the result of the search for a remainder; `found` has the errors without a remainder.
 pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
     let after = outcome.held_out.map(|errors| number(errors.mean.norm * 1e3, 4));
-    if let Some(widening) = outcome.carried.filter(|_| !outcome.is_declared) {
-        return carried_text(outcome, widening);
+    if let Some(carried) = outcome.carried.filter(|_| !outcome.is_declared) {
+        return carried_text(outcome, carried);
     }
     let Some(gain) = outcome.gain.filter(|_| !outcome.is_declared) else {
         return match after {
@@ -34,8 +34,13 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     match after {
         Some(after) => format!(
             "A remainder (smooth correction) at {} is kept, because it improves the prediction of poses left out of its fit: the mean \
-             error of left-out configurations falls from {without} mm to {with} mm, that of held-out poses goes from {before} mm to {after} mm.",
+             error of left-out configurations falls from {without} mm to {with} mm{held_out}.",
             counted(outcome.joints, "joint"),
+            held_out = if found.fitted.is_left_out {
+                String::new()
+            } else {
+                format!(", that of held-out poses goes from {before} mm to {after} mm")
+            },
         ),
         None => format!(
             "No remainder (smooth correction) is kept, because it {predicts}: mean error \
@@ -53,23 +58,36 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     }
 }
 
-/// States what was carried over from an earlier estimate; `widening` is the factor on its error
-/// bounds.
-fn carried_text(outcome: &Outcome, widening: f64) -> String {
+/// States what was carried over from an earlier estimate, and which new rows conditioned it.
+fn carried_text(outcome: &Outcome, carried: Carried) -> String {
+    let Carried { widening, positions, conditioning } = carried;
+    let why_kept = if positions == 0 {
+        "no new row measures a position"
+    } else {
+        "the new positions could not be used, because some have no finite prediction"
+    };
     let mut text = match outcome.gain {
         Some(gain) => {
             let [without, with] =
                 [gain.without, gain.with].map(|error| number(error * 1e3, 4));
+            let rows = if conditioning < positions {
+                format!("rows ({conditioning} of {positions} positions)")
+            } else {
+                "rows that measure positions".to_owned()
+            };
             format!(
-                "The remainder (smooth correction) of the earlier estimate, at {}, was updated with the new rows, together with the \
+                "The remainder (smooth correction) of the earlier estimate, at {}, was updated with the new {rows}, together with the \
                  parameters. If each new configuration is predicted from the earlier rows and the other new ones, the mean error is \
                  {without} mm without the remainder and {with} mm with it.",
                 counted(outcome.joints, "joint"),
             )
         }
         None if outcome.joints > 0 => format!(
-            "The remainder (smooth correction) of the earlier estimate, at {}, was kept; no new row measures a position.",
+            "The remainder (smooth correction) of the earlier estimate, at {}, was kept unchanged: {why_kept}.",
             counted(outcome.joints, "joint"),
+        ),
+        None if conditioning == 0 => format!(
+            "The error bounds of the earlier estimate were kept: {why_kept}; it has no remainder."
         ),
         None => "The error bounds of the earlier estimate were updated with the new rows; it has no remainder."
             .to_owned(),
@@ -130,7 +148,8 @@ pub(super) fn why_no_bound(found: &Identification) -> Option<String> {
     let reason = if !found.is_trusted() {
         return None;
     } else if found.prior.is_some() {
-        "the earlier estimate has none, and the new rows alone do not determine it".to_owned()
+        "none is computed from the new rows of a fit with a prior, and none could be carried over"
+            .to_owned()
     } else if found.fitted.identification.kind != "position" {
         "no positions are measured".to_owned()
     } else if found.poses < MIN_CONFIGURATIONS {

@@ -1,9 +1,9 @@
 //! Remainder and error bounds of an earlier estimate, carried over to a new one.
 
-use flexcal::fit::{FindingCode, Options, SavedEstimate};
+use flexcal::fit::{self, FindingCode, Options, SavedEstimate};
 use flexcal::life::{PriorSource, Update, update};
 use flexcal::measurement::Measurements;
-use flexcal::problem::Problem;
+use flexcal::problem::{Observation, Problem};
 use flexcal::remainder::{self, Bounds, Correction};
 use flexcal::results::{Document as _, IdentificationResult};
 
@@ -98,15 +98,11 @@ fn the_remainder_survives_five_new_poses() {
     let (estimate, before) = calibrated(&bench, &arm, &folder);
     let next_day = updated(&bench, &arm, 5, &estimate);
     let (with, without) = errors(&bench, &arm, &next_day);
-    println!(
-        "{:.2e} ({:.3}) then {:.2e} ({:.3}), without {without:.2e}",
-        before.mean, before.coverage, with.mean, with.coverage
-    );
     assert!(with.mean < 1.15 * before.mean && without > 1.5 * before.mean);
     // The bounds hold as well as those of the full calibration.
     assert!(with.coverage > before.coverage - 0.03, "{} {}", with.coverage, before.coverage);
     let fitted = next_day.predictions.unwrap();
-    assert!(fitted.carried.unwrap() < 1.0 + 1e-12 && !fitted.is_declared);
+    assert!(fitted.carried.unwrap().widening < 1.0 + 1e-12 && !fitted.is_declared);
 }
 
 #[test]
@@ -119,10 +115,6 @@ fn a_moved_zero_is_learned_beside_the_remainder() {
     let finding = next_day.found.finding(FindingCode::EarlierEstimateContradicted).unwrap();
     assert_eq!(finding.word("cause"), Some("zero of joint 2"), "{finding}");
     let (with, without) = errors(&bench, &collided, &next_day);
-    println!(
-        "{:.2e} ({:.3}) then {:.2e} ({:.3}), without {without:.2e}",
-        before.mean, before.coverage, with.mean, with.coverage
-    );
     assert!(with.mean < 1.15 * before.mean && without > 1.5 * before.mean);
     // The bounds hold as well as those of the full calibration.
     assert!(with.coverage > before.coverage - 0.03, "{} {}", with.coverage, before.coverage);
@@ -153,6 +145,30 @@ fn an_update_can_be_updated_and_is_read_back() {
     let second = update(&bench.problem, &rows, &Options::default(), &source, 30.0).unwrap();
     let (with, _) = errors(&bench, &arm, &second);
     assert!(with.mean < 1.2 * before.mean, "{} {}", with.mean, before.mean);
+}
+
+#[test]
+fn a_row_that_measures_no_position_leaves_the_update_by_the_others() {
+    let (bench, folder) = (Bench::new(), Folder::new());
+    let arm = bench.arm(4);
+    let (estimate, before) = calibrated(&bench, &arm, &folder);
+    let collided = with_zero(&arm, 2, 0.05);
+    // The last row states a tilt as the first calibration predicts it, with a large σ.
+    let mut rows = bent(&bench, &collided, 9, 900);
+    rows.observations = vec![Observation::Position; 9];
+    rows.observations[8] = Observation::Tilt(6);
+    rows.sigma = Some([[5e-5; 8].as_slice(), &[0.1]].concat());
+    rows.positions[8] =
+        fit::predict(&bench.problem, Some(&estimate), &rows, None).unwrap().positions[8];
+    let source = PriorSource::Estimate(Box::new(estimate));
+    let next_day =
+        update(&bench.problem, &whole(&rows), &Options::default(), &source, 1.0).unwrap();
+    let finding = next_day.found.finding(FindingCode::EarlierEstimateContradicted).unwrap();
+    assert_eq!(finding.word("cause"), Some("zero of joint 2"), "{finding}");
+    let (with, without) = errors(&bench, &collided, &next_day);
+    assert!(with.mean < 1.15 * before.mean && without > 1.5 * before.mean);
+    let carried = next_day.predictions.unwrap().carried.unwrap();
+    assert_eq!((carried.positions, carried.conditioning), (8, 8));
 }
 
 /// Writes rows as a table of positions.
