@@ -43,7 +43,8 @@ pub(super) fn tested(
 ) -> Option<CorrectedTest> {
     let PredictedRows { rows: places, residual, covariance, sigma } = predicted;
     let extended = Extended::new(problem, model, x, [&placement.bases, &placement.targets]);
-    let poses: Vec<Pose> = placement.poses(table, &places, 1.0);
+    let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
+    let poses: Vec<Pose> = placement.oriented_poses(table, &places, (1.0, turn));
     let poses = poses.into_iter().zip(&sigma).map(|(pose, &sigma)| Pose { sigma, ..pose });
     let mut rows = SensitiveRows::new(&extended.model, poses.collect(), &extended.x);
     rows.residual.fill(0.0);

@@ -52,6 +52,8 @@ pub struct Watch {
     pub rows: usize,
     /// Number of rows that were left out, because the estimate was fitted to them.
     pub left_out: usize,
+    /// True if the estimate has a remainder, which the test leaves out.
+    pub leaves_remainder: bool,
     /// Number of rows at each look, and ln of the evidence for a change from these rows.
     pub looks: Vec<(usize, f64)>,
     /// Number of rows at the first look with an alarm; `None` if the arm is unchanged.
@@ -176,6 +178,7 @@ pub fn watch(
         estimate_trusted: estimate.trusted,
         rows: kept.len(),
         left_out,
+        leaves_remainder: estimate.remainder.is_some(),
         looks: assessed.looks,
         changed_at,
         chi2: (assessed.chi2, assessed.coordinates, p_value),

@@ -41,7 +41,12 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
     );
     let _ = write!(
         head,
-        "\nError of the rows: {} rms{}",
+        "\nError of the rows{}: {} rms{}",
+        if watch.leaves_remainder {
+            " without the remainder of the estimate, which this test leaves out"
+        } else {
+            ""
+        },
         in_unit(watch.error),
         match p {
             _ if watch.is_changed() => "",
