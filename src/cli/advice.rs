@@ -229,10 +229,15 @@ pub fn after_applying(
     let [named, file] = [common.problem(), path].map(shell_word);
     let fitted = fitted_arguments(common, problem, estimate);
     if !estimate.trusted {
-        return format!("flexcal identify {fitted} says why the estimate is not to be trusted");
+        return format!(
+            "flexcal identify {fitted}{} says why the estimate is not to be trusted",
+            strategy_argument(estimate)
+        );
     }
     // A remainder in the problem comes from a loop, which has searched for causes already.
-    if estimate.posterior.noise_factor > 1.0 && problem.remainder.is_none() {
+    // The new rows of an update are too few for a search.
+    let is_searched = problem.remainder.is_some() || estimate.posterior.has_prior;
+    if estimate.posterior.noise_factor > 1.0 && !is_searched {
         return format!(
             "flexcal loop {fitted} looks for what the model lacks, because the estimate leaves more than noise"
         );
@@ -244,7 +249,8 @@ pub fn after_applying(
 }
 
 /// Formats the problem and the measurement files to which an estimate was fitted as arguments of a
-/// suggested command. Without names of these files, those of the problem are meant.
+/// suggested command. Those of the problem are meant if the estimate names none, or names files that
+/// do not exist as seen from the current folder.
 pub fn fitted_arguments(common: &Common, problem: &Problem, estimate: &SavedEstimate) -> String {
     let named = shell_word(common.problem());
     let files = &estimate.measurement_files;
@@ -252,11 +258,23 @@ pub fn fitted_arguments(common: &Common, problem: &Problem, estimate: &SavedEsti
         let of = |file: &PathBuf| file.canonicalize().unwrap_or_else(|_| file.clone());
         files.iter().map(of).collect()
     };
-    if files.is_empty() || real(files) == real(&problem.data.files) {
+    if files.is_empty()
+        || !files.iter().all(|file| file.is_file())
+        || real(files) == real(&problem.data.files)
+    {
         return named;
     }
     let files: Vec<String> = files.iter().map(|file| shell_word(file)).collect();
     format!("{named} --data {}", files.join(" "))
+}
+
+/// Formats the strategy of an estimate as an argument of `identify`, beginning with a space; empty
+/// for the default strategy.
+pub fn strategy_argument(estimate: &SavedEstimate) -> String {
+    match estimate.strategy {
+        Strategy::Joint => String::new(),
+        strategy => format!(" --strategy {}", strategy.as_str()),
+    }
 }
 
 /// Returns true if pixels are measured instead of positions, so that the arm need not have a target

@@ -158,8 +158,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let reached = commands.iter().filter(|command| command.is_reached()).count();
         let next = if !trusted {
             format!(
-                "flexcal identify {} says why the estimate is not to be trusted; correct that, and identify again before commands are corrected",
-                advice::fitted_arguments(common, &problem, &estimate)
+                "flexcal identify {}{} says why the estimate is not to be trusted; correct that, and identify again before commands are corrected",
+                advice::fitted_arguments(common, &problem, &estimate),
+                advice::strategy_argument(&estimate)
             )
         } else if misplaced.is_some() {
             "correct the frame or the unit of the targets, as the warning says".to_owned()

@@ -131,12 +131,20 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
 /// States the mean errors without the remainder of each side that has one.
 fn remainder_sentences(sides: &[Side; 2]) -> Vec<String> {
     let sentence = |(name, side): (&str, &Side)| {
-        let means = side.without_remainder.iter().filter(|(of, _)| of.contains("mean"));
+        // Errors of left-out configurations are without the remainder everywhere.
+        let is_left_out = |(of, _): &&(String, f64)| of.starts_with("left out");
+        let exception = if side.without_remainder.iter().any(|of| is_left_out(&of)) {
+            ", except those of left-out configurations, which are without it"
+        } else {
+            ""
+        };
+        let means =
+            side.without_remainder.iter().filter(|of| of.0.contains("mean") && !is_left_out(of));
         let words: Vec<String> =
             means.map(|(of, error)| format!("{of}: {}", number(*error, 4))).collect();
         (!words.is_empty()).then(|| {
             format!(
-                "Errors of {name} are with its remainder. The parameters below, without it, give: {}.",
+                "Errors of {name} are with its remainder{exception}. The parameters below, without it, give: {}.",
                 words.join("; ")
             )
         })

@@ -86,7 +86,10 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
             // expected.
             let is_hidden = comparison.chi2.is_some_and(|(.., p)| p >= MIN_AGREEING_P);
             let but = if is_hidden { ", but the test for single causes finds one" } else { "" };
-            format!("{but}. They disagree: {}.", causes.join("; "))
+            format!(
+                "{but}. They disagree. Most probable of the causes that are tried: {}.",
+                causes.join("; ")
+            )
         }
     };
     text + &verdict

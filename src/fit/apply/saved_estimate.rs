@@ -58,7 +58,7 @@ pub struct SavedEstimate {
     /// Digest of each part of the declared arm, by its name; empty in files of older versions.
     pub(crate) arm_parts: BTreeMap<String, String>,
     /// Strategy of the fit.
-    pub(crate) strategy: Strategy,
+    pub strategy: Strategy,
     parameters: Vec<Entry>,
     /// Uncertainty and noise of the estimate.
     pub(crate) posterior: SavedPosterior,
@@ -78,6 +78,8 @@ pub(crate) struct SavedPosterior {
     pub noise_factor: f64,
     /// Digests of the rows that were fitted; empty in files of older versions.
     pub fitted_rows: HashSet<String>,
+    /// True if the fit had an earlier estimate or a fleet as prior.
+    pub has_prior: bool,
     /// True if the prior of a fleet is part of the prior of the fit.
     pub includes_fleet: bool,
 }
@@ -282,6 +284,7 @@ impl SavedEstimate {
                 sigma_taken: sigma_taken_mm.map(|sigma| sigma * 1e-3),
                 noise_factor: noise_factor.unwrap_or(1.0),
                 fitted_rows: fitted_rows.unwrap_or_default(),
+                has_prior: prior.is_some(),
                 includes_fleet: prior.and_then(|prior| prior.includes_fleet).unwrap_or(false),
             },
             parameters,
