@@ -7,14 +7,13 @@
 use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
 use serde_json::json;
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::row_steps::{Linear, MIN_ROWS, Place, Places, Step};
 use crate::fit::uncertainty::noise::Noise;
 use crate::least_squares::Loss;
-use crate::measurement::Measurements;
 use crate::model::parameter::{JointField, Parameter, ParameterSite, Regressor};
 use crate::problem::{JointKind, Problem};
 use crate::random;
@@ -33,6 +32,9 @@ const MIN_OTHER_RATIO: f64 = 2.0;
 /// grows with the product of the number of rows and the square of the number of unknowns, and, for a
 /// fixed number of rows, with the cube of the number of unknowns.
 const MAX_SIZE: [usize; 2] = [4000, 150];
+/// Smallest probability of a residual as large as that of two arms, by noise alone. A larger residual
+/// shows that the model lacks something, which two arms approximate better than one.
+const MIN_NOISE_PROBABILITY: f64 = 1e-3;
 /// Number of random orders of the rows.
 const RANDOM_ORDERS: usize = 19;
 /// Seed of the random orders.
@@ -99,12 +101,12 @@ fn changed(fit: &CheckedFit) -> Option<Finding> {
     }
     places.insert(Place::Arm, (0..unknowns.len()).collect());
     let linear = Linear::of(fit)?;
-    let table = fit.fitting.measurements;
     let mut order: Vec<usize> = (0..rows.len()).collect();
     order.sort_by_key(|&place| rows[place]);
     let of_place = linear.best_of_places(&places, &order, &|_| true);
-    let step = linear.better(of_place, linear.best_of_arm_refined(&order))?;
-    let freedom = (linear.freedom - step.columns as f64).max(1.0);
+    let of_arm = linear.best_of_arm_refined(&order).filter(|step| is_noise(&linear, step));
+    let step = linear.better(of_place, of_arm)?;
+    let freedom = freedom_of(&linear, &step);
     let noise = freedom.min(linear.cost);
     let explained = (linear.cost - step.cost) / (linear.cost - noise).max(f64::MIN_POSITIVE);
     if explained < MIN_EXPLAINED {
@@ -116,26 +118,62 @@ fn changed(fit: &CheckedFit) -> Option<Finding> {
     if chance * tries > MAX_CHANCE_PROBABILITY {
         return None;
     }
-    if is_explained_otherwise(&linear, &places, (table, rows, &order), &step) {
+    if is_explained_otherwise(fit, (&linear, &places), &order, &step) {
         return None;
     }
     Some(finding(fit, &linear, &places, &order, &step))
 }
 
+/// Returns true if the residual with a change is not larger than that of the declared noise (χ²
+/// test), so that the rows before and after fit by themselves.
+fn is_noise(linear: &Linear, step: &Step) -> bool {
+    ChiSquared::new(freedom_of(linear, step))
+        .is_ok_and(|squares| squares.sf(step.cost) >= MIN_NOISE_PROBABILITY)
+}
+
+/// Returns the number of measured coordinates beyond the unknowns and the changes of some of them.
+fn freedom_of(linear: &Linear, step: &Step) -> f64 {
+    (linear.freedom - step.columns as f64).max(1.0)
+}
+
+/// Returns the columns by whose values the rows are sorted into other orders: joints, their
+/// directions of approach, payload, hoist force, temperature, covariates, and the place of the target
+/// in the frame of the base. The place is predicted, so that a moved instrument does not change it.
+fn other_columns(fit: &CheckedFit, order: &[usize]) -> Vec<Vec<f64>> {
+    let table = fit.fitting.measurements;
+    let rows: Vec<usize> =
+        order.iter().map(|&place| fit.fitting.split.identification[place]).collect();
+    let in_rows = |value: &dyn Fn(usize) -> f64| rows.iter().map(|&row| value(row)).collect();
+    let joints = table.joints;
+    let mut columns: Vec<Vec<f64>> =
+        (0..joints).map(|joint| in_rows(&|row| table.configuration(row)[joint])).collect();
+    if let Some(approach) = &table.approach {
+        columns.extend((0..joints).map(|joint| in_rows(&|row| approach[row * joints + joint])));
+    }
+    let optional = [&table.payload, &table.hoist, &table.temperature].into_iter().flatten();
+    columns.extend(optional.map(|of| in_rows(&|row| of[row])));
+    let covariates = rows.first().map_or(0, |&row| table.covariates_of(row).len());
+    columns.extend((0..covariates).map(|k| in_rows(&|row| table.covariates_of(row)[k])));
+    let targets = fit
+        .fitting
+        .model
+        .predicted_targets_in_base(&fit.fitting.poses(&rows), fit.end.x.as_slice());
+    let along =
+        |axis: usize| targets.iter().map(move |at| at.map_or(f64::NAN, |at| at[axis])).collect();
+    columns.extend((0..3).map(along));
+    columns
+}
+
 /// Returns true if a change in another order of the rows, or a drift, explains the residual about
 /// as well as a step: the order of the table is then not what counts.
 fn is_explained_otherwise(
-    linear: &Linear,
-    places: &Places,
-    (table, rows, order): (&Measurements, &[usize], &[usize]),
+    fit: &CheckedFit,
+    (linear, places): (&Linear, &Places),
+    order: &[usize],
     step: &Step,
 ) -> bool {
     let most = MIN_OTHER_RATIO * step.cost;
-    let mut columns: Vec<Vec<f64>> = (0..table.joints)
-        .map(|joint| order.iter().map(|&place| table.configuration(rows[place])[joint]).collect())
-        .collect();
-    let optional = [&table.payload, &table.hoist, &table.temperature].into_iter().flatten();
-    columns.extend(optional.map(|of| order.iter().map(|&place| of[rows[place]]).collect()));
+    let columns = other_columns(fit, order);
     let explains = |other: &[usize], may_begin: &dyn Fn(usize) -> bool| {
         let mut firsts = linear.arm_rows(other.len(), may_begin);
         // A sorted order may be that of the table, or the reverse.
