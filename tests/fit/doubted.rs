@@ -137,6 +137,20 @@ fn a_place_that_changes_between_two_rows_is_named() {
         at.z += 4e-5 * row as f64;
     }
     assert_eq!(changed(&problem, &data), None);
+    // A drift in the middle third of the fitted rows: a step explains nine tenths of it, an even
+    // drift as much.
+    let mut data = clean.clone();
+    for (row, at) in data.measurements.positions.iter_mut().enumerate() {
+        at.z += 1e-4 * row.clamp(20, 40) as f64;
+    }
+    assert_eq!(changed(&problem, &data), None);
+    // Another arm measured the later rows.
+    let mut data = clean.clone();
+    let other = measured(&problem, 4).measurements;
+    data.measurements.positions[30..].copy_from_slice(&other.positions[30..]);
+    data.measurements.configurations[150..].copy_from_slice(&other.configurations[150..]);
+    let (place, text) = changed(&problem, &data).unwrap();
+    assert!(place == "arm" && text.contains("30 of 60 rows"), "{text}");
     let mut data = clean;
     for row in 0..90 {
         if data.measurements.configuration(row)[1] > 0.3 {

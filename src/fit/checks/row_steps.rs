@@ -313,20 +313,22 @@ impl Linear {
     }
 
     /// Returns the smallest cost with a drift of some unknowns that grows evenly over the rows.
-    pub fn cost_of_drift(&self, columns: &[usize], order: &[usize]) -> Option<f64> {
+    pub fn cost_of_drift(&self, place: Place, columns: &[usize], order: &[usize]) -> Option<f64> {
         let mut drifting = self.jacobian.select_columns(columns);
-        for (place, &pose) in order.iter().enumerate() {
-            let share = place as f64 / order.len() as f64;
+        for (row, &pose) in order.iter().enumerate() {
+            let share = row as f64 / order.len() as f64;
             drifting.rows_mut(self.coordinates * pose, self.coordinates).scale_mut(share);
         }
-        let seen = &self.reduced * &drifting;
-        let mut matrix = drifting.tr_mul(&drifting);
-        for place in 0..columns.len() {
-            matrix[(place, place)] *= 1.0 + 1e-9;
-        }
-        matrix -= seen.tr_mul(&seen);
-        let slope = drifting.tr_mul(&self.residual) - seen.tr_mul(&self.slope);
-        Some(self.cost - factor(matrix)?.solve(&slope).dot(&slope))
+        let sums = (
+            &drifting.tr_mul(&drifting),
+            &(&self.reduced * &drifting),
+            &drifting.tr_mul(&self.residual),
+        );
+        let prior = match place {
+            Place::Arm => self.difference.clone(),
+            _ => DVector::zeros(columns.len()),
+        };
+        self.explained(sums, &prior).map(|(gain, _)| self.cost - gain)
     }
 }
 
