@@ -27,12 +27,8 @@ const INPUT_MISTAKES: [FindingCode; 6] = [
 ];
 
 /// Findings that name rows or columns of the table that are wrong.
-const CORRECTED_IN_TABLE: [FindingCode; 4] = [
-    FindingCode::ColumnDoubted,
-    FindingCode::RowsDoubted,
-    FindingCode::RowsChanged,
-    FindingCode::CommandsRounded,
-];
+const CORRECTED_IN_TABLE: [FindingCode; 3] =
+    [FindingCode::ColumnDoubted, FindingCode::RowsDoubted, FindingCode::CommandsRounded];
 
 /// Returns what to do after a fit, as a command or in words. `is_structured` is true if the
 /// residual tests detect structure; `estimate` is the path of the estimate.json that was written.
@@ -66,6 +62,10 @@ pub fn after_fit(
         _ if !found.is_trusted() && CORRECTED_IN_TABLE.iter().any(|code| found.has(*code)) => {
             format!("correct the table as the warning says, then flexcal identify {named}")
         }
+        // A search for effects would attribute the change to the model, even if the fit is trusted.
+        _ if found.has(FindingCode::RowsChanged) => format!(
+            "follow the warning on the row from which on something changed, then flexcal identify {named}"
+        ),
         Some(look) => {
             format!("{look}; if they are right, {search}")
         }

@@ -9,8 +9,8 @@ use crate::results::ResidualSize;
 
 /// Codes of warnings that contradict a trusted fit or its predictions, so that its headline names
 /// reservations.
-const RESERVATIONS: [FindingCode; 2] =
-    [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutNotBetter];
+const RESERVATIONS: [FindingCode; 3] =
+    [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutNotBetter, FindingCode::RowsChanged];
 
 /// States whether the fit is to be trusted, the held-out error before and after it, and how much
 /// its residual exceeds the declared noise.
