@@ -146,7 +146,7 @@ pub(crate) fn open_scale(
 ///
 /// Lengths that other unknowns make up for may be held: those of the first joint, which move all
 /// points, and those from d of the last joint on, which move the target. Priors give the scale, but
-/// do not measure it.
+/// do not measure it. The commands of a sliding joint are known lengths.
 fn scale(
     problem: &Problem,
     table: &Measurements,
@@ -170,7 +170,11 @@ fn scale(
     }
     let has_other_lengths =
         problem.is_elastic() || problem.joints.iter().any(|joint| joint.beam.is_some());
+    let slides = |joint: &Joint| joint.command_kind() == JointKind::Prismatic;
     if has_other_lengths || !problem.targets.is_empty() || !has_axes("tool") {
+        return None;
+    }
+    if problem.joints.iter().any(slides) {
         return None;
     }
     let moves = |joint: &Joint| joint.command_kind() != JointKind::Fixed;
