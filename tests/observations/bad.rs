@@ -7,6 +7,8 @@ use flexcal::least_squares::UnidentifiableCombination;
 use flexcal::rig::Truth;
 
 use crate::bench::{ARM, AROUND, Bench, LINE, problem, true_arm};
+use crate::common::arms::parse;
+use crate::common::program::assert_contains;
 use crate::common::reading::{assert_says, problem_error, read_dataset, try_dataset};
 
 fn table(more: &str, rows: &str) -> String {
@@ -224,6 +226,11 @@ fn noise_of_what_is_measured() {
     }
 }
 
+/// Returns true if the fit reports that the rows leave the scale open.
+fn is_open(found: &Identification) -> bool {
+    found.findings.iter().any(|finding| finding.word("what") == Some("scale"))
+}
+
 /// Contacts without a known length leave the scale open, however narrow the priors of the lengths
 /// are; a wrong length makes all lengths wrong in proportion.
 #[test]
@@ -238,9 +245,6 @@ fn the_scale_of_contacts_is_that_of_the_known_length() {
         let data = read_dataset(&problem, &Bench::new(arm, 7).table(&["point"], 90));
         identify(&problem, &data, &Options::default()).unwrap()
     };
-    let is_open = |found: &Identification| {
-        found.findings.iter().any(|finding| finding.word("what") == Some("scale"))
-    };
     let without = found("");
     assert!(is_open(&without), "{:?}", without.findings);
     let right = found(known);
@@ -248,7 +252,49 @@ fn the_scale_of_contacts_is_that_of_the_known_length() {
     assert!(!right.has(FindingCode::ScaleContradicted), "{:?}", right.findings);
     let wrong = found(&known.replace("593.7", "581.8"));
     let finding = wrong.finding(FindingCode::ScaleContradicted).unwrap().to_string();
-    assert!(finding.contains("shorter than declared, in proportion"), "{finding}");
+    assert_contains(&finding, &["a common factor of 0.98", "% shorter than declared"]);
     assert!(finding.contains("\"left\" to \"right\" is declared 581.817 mm"), "{finding}");
     assert!(!wrong.is_trusted());
+}
+
+/// The commands of a sliding joint are lengths, so that contacts determine the scale of an arm that
+/// has one.
+#[test]
+fn the_commands_of_a_slide_give_the_scale() {
+    let point = "[[point]]\nname = \"left\"\n[[point]]\nname = \"right\"\n[[point]]\nname = \"top\"\n\
+                 [data]\npoint_sigma_mm = 0.05\nheld_out = { fraction = 0.2, seed = 1 }\n";
+    for (kind, scale) in [("", true), ("kind = \"prismatic\", ", false)] {
+        let arm = ARM.replace("{ name = \"elbow\", ", &format!("{{ name = \"elbow\", {kind}"));
+        let mut problem = parse(&format!("{arm}{point}"));
+        // Moments of known weights would depend on the lengths.
+        problem.joints.iter_mut().for_each(|joint| joint.stiffness = None);
+        problem.parameters.retain(|rule| !rule.pattern.contains("stiffness"));
+        let (arm, _) = true_arm(&problem, 2);
+        let text = Bench::new(arm, 7).table(&["point"], 60);
+        let text = if scale { text } else { text.replace("q3_rad", "q3_m") };
+        let data = read_dataset(&problem, &text);
+        let found = identify(&problem, &data, &Options::default()).unwrap();
+        assert_eq!(is_open(&found), scale, "{kind} {:?}", found.findings);
+    }
+}
+
+/// Two wrong entries among four lengths of an arm are no common factor.
+#[test]
+fn two_wrong_lengths_are_no_scale() {
+    let lengths = ARM.replace("alpha_deg = 90, stiffness", "alpha_deg = 90, a_m = 0.3, stiffness");
+    let lengths = lengths.replace("a_m = 0.1, d_m = 0.55", "a_m = 0.3, d_m = 0.55");
+    let mut problem = parse(&format!("{lengths}{AROUND}"));
+    problem.joints.iter_mut().for_each(|joint| joint.stiffness = None);
+    problem.parameters.retain(|rule| !rule.pattern.contains("stiffness"));
+    for (others, contradicted) in [(1.0, false), (1.04, true)] {
+        let (mut arm, _) = true_arm(&problem, 2);
+        arm.joints[1].a *= others;
+        arm.joints[3].a *= others;
+        arm.joints[2].a *= 1.04;
+        arm.joints[3].d *= 1.04;
+        let data = read_dataset(&problem, &Bench::new(arm, 7).table(&["point"], 90));
+        let found = identify(&problem, &data, &Options::default()).unwrap();
+        let scale = found.has(FindingCode::ScaleContradicted);
+        assert_eq!(scale, contradicted, "{:?}", found.findings);
+    }
 }

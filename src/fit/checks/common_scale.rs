@@ -1,6 +1,6 @@
 //! Check whether all lengths of the fitted arm deviate from nominal by one common factor.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
@@ -18,6 +18,10 @@ const MIN_SCALE_ERROR: f64 = 3e-3;
 /// support. A single wrong length is no common factor.
 const MIN_SIGMAS_OF_OTHERS: f64 = 3.0;
 
+/// Largest scatter of the lengths about the common factor, beyond that of their priors and relative
+/// to what the factor explains, at which they deviate in proportion.
+const MAX_UNEXPLAINED: f64 = 0.1;
+
 /// Checks that the lengths of the arm do not deviate from nominal by one common factor, as they do
 /// if the lengths that scale the measurements are wrong.
 pub(super) struct ScaleHolds;
@@ -31,12 +35,14 @@ impl Check for ScaleHolds {
         if !Misfit.check(fit).is_empty() {
             return Vec::new();
         }
-        let CommonFactor { error, score, lengths, .. } = found;
+        let CommonFactor { error, score, lengths, determined, .. } = found;
         let side = if error > 0.0 { "longer" } else { "shorter" };
         let sigmas = score.abs();
         let text = format!(
-            "all {lengths} fitted lengths of the arm are {:.2} % {side} than declared, in proportion, {sigmas:.1} σ beyond \
-             what their priors allow",
+            "a common factor of {:.4} explains the fitted lengths of the arm ({lengths} lengths, of which the \
+             measurements determine about {determined:.0}): they are {:.2} % {side} than declared, {sigmas:.1} σ beyond what \
+             their priors allow",
+            1.0 + error,
             100.0 * error.abs()
         );
         let numbers = [error.into(), sigmas.into(), json!(lengths)];
@@ -50,10 +56,18 @@ fn remedy(fit: &CheckedFit, factor: f64) -> String {
     let leading = fit.fitting.measurements.leading();
     let arm = "or the lengths of the joint table and their priors";
     if leading.kind() == Observation::Pixel(0, 0, 0).kind() {
+        let marker = leading.fixtures()[1];
+        let print = marker.and_then(|marker| spacing(fit.fitting.model.marker_points(marker)));
+        let print = print.map_or_else(String::new, |spacing| {
+            format!(
+                " (measure the print: points 0 and 1 are declared {:.3} mm apart, the declared lengths of the arm \
+                 say {:.3} mm)",
+                spacing * 1e3,
+                spacing * 1e3 / factor
+            )
+        });
         return format!(
-            "check the points of the marker, from which all lengths follow (measure the print: squares of \
-             25 mm would be {:.2} mm), {arm}",
-            25.0 / factor
+            "check the points of the marker, from which all lengths follow{print}, {arm}"
         );
     }
     let lengths = |distance: &KnownDistance| {
@@ -78,6 +92,11 @@ fn remedy(fit: &CheckedFit, factor: f64) -> String {
     }
 }
 
+/// Returns the distance between the first two points of a marker \[m\]; `None` with fewer points.
+fn spacing(points: &[Vector3<f64>]) -> Option<f64> {
+    Some((points.get(1)? - points.first()?).norm())
+}
+
 /// Common factor of the lengths of the arm, estimated from their fitted deviations and priors.
 ///
 /// Score test of s in the prior mean s L of the deviations x, whose prior covariance is Σ = diag σ²
@@ -92,8 +111,13 @@ struct CommonFactor {
     score: f64,
     /// Score of the lengths without the most informative one.
     others: f64,
+    /// Scatter of the deviations about the common factor, relative to what the factor explains; both
+    /// are sums of squares in units of the priors.
+    unexplained: f64,
     /// Number of lengths.
     lengths: usize,
+    /// Number of lengths that the data determine: sum of the shares of each.
+    determined: f64,
 }
 
 impl CommonFactor {
@@ -134,20 +158,27 @@ impl CommonFactor {
         if !(information > 0.0 && freedom > 0.5) {
             return None;
         }
-        let rest = (&deviations - error * (&determined * &nominal)).norm_squared() / freedom;
-        let scatter = rest.max(1.0).sqrt();
+        let explained = error * (&determined * &nominal);
+        let rest = (&deviations - &explained).norm_squared();
+        // The usual scatter within the priors, up to two of its standard deviations, is no objection.
+        let usual = freedom + 2.0 * (2.0 * freedom).sqrt();
+        let unexplained = (rest - usual).max(0.0) / explained.norm_squared();
+        let scatter = (rest / freedom).max(1.0).sqrt();
         let mut others = nominal.clone();
         others[nominal.iamax()] = 0.0;
         let (error_of_others, of_others) = score_of(&others);
         let others = error_of_others * of_others.max(0.0).sqrt() / scatter;
-        Some(Self { error, score: error * information.sqrt() / scatter, others, lengths: n })
+        let score = error * information.sqrt() / scatter;
+        let determined = determined.trace();
+        Some(Self { error, score, others, unexplained, lengths: n, determined })
     }
 
-    /// Returns true if the factor is far beyond what the priors allow, and more than one length
-    /// supports it.
+    /// Returns true if the factor is far beyond what the priors allow, more than one length supports
+    /// it, and the lengths deviate in proportion.
     fn is_clear(&self) -> bool {
         self.error.abs() > MIN_SCALE_ERROR
             && self.score.abs() > MAX_PRIOR_SIGMAS
             && self.others * self.error.signum() > MIN_SIGMAS_OF_OTHERS
+            && self.unexplained < MAX_UNEXPLAINED
     }
 }
