@@ -3,7 +3,7 @@
 
 use crate::common::arms::parse;
 use crate::common::made::{
-    at_random, divided, draw, fit, fit_as_command, labels, measure, model_of,
+    at_random, divided, draw, fit, fit_as_command, labels, measure, model_of, of_targets,
 };
 use flexcal::fit::{FindingCode, Misreading};
 use flexcal::measurement::{CommandColumn, Dataset};
@@ -47,7 +47,7 @@ fn poses_that_say_little_about_others_are_named() {
     let problem = arm(PRIORS);
     let in_arm = |problem: &Problem, edit: &dyn Fn(usize, f64) -> f64| {
         let mut rng = ChaCha8Rng::seed_from_u64(9);
-        let mut rows = at_random(problem, 90, 2.0, &mut rng);
+        let mut rows = of_targets(problem, at_random(problem, 90, 2.0, &mut rng));
         let joints = rows.joints;
         let commands = rows.configurations.iter_mut().enumerate();
         commands.for_each(|(place, q)| *q = edit(place % joints, *q));
@@ -70,6 +70,20 @@ fn poses_that_say_little_about_others_are_named() {
     let with_flange = parse(&text(PRIORS).replace("[tool]", flange));
     let last = in_arm(&with_flange, &|joint, q| if joint == 4 { 0.35 } else { q });
     assert!(last.contains("q5 stays at 20.1°"), "{last}");
+    // One of several targets beside the axis suffices, whichever is measured first.
+    let joints = "'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }";
+    let targets = |places: [[f64; 3]; 2]| {
+        let words = ["A", "B"].into_iter().zip(places);
+        let words = words.map(|(name, at)| format!("[[target]]\nname = '{name}'\nat_m = {at:?}\n"));
+        let tool = "[tool]\ntarget_m = [0.05, 0.02, 0.12]\n";
+        let problem = parse(&text(joints).replace(tool, &words.collect::<String>()));
+        in_arm(&problem, &|joint, q| if joint == 4 { 0.35 } else { q })
+    };
+    let [on, beside] = [[0.0, 0.0, 0.12], [0.05, 0.02, 0.12]];
+    for (places, is_named) in [([on, beside], true), ([beside, on], true), ([on, on], false)] {
+        let last = targets(places);
+        assert_eq!(last.contains("q5 stays at 20.1°"), is_named, "{places:?} {last}");
+    }
 }
 
 #[test]

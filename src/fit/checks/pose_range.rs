@@ -1,11 +1,14 @@
 //! Check that the fitted poses move the joints far enough for a statement about other poses.
 
+use std::collections::BTreeSet;
+
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::doubted_columns::{column_name, moving, still_joints};
 use super::finding::{Finding, FindingCode};
 use super::misfit::Misfit;
+use crate::observation::Needs;
 use crate::problem::JointKind;
 
 /// Largest range of the commands of every turning joint at which all poses are alike: 10° \[rad\].
@@ -87,12 +90,26 @@ impl Check for PosesSpread {
     }
 }
 
-/// Returns true if the joint at index `joint` moves the measured point of one of the `rows`.
+/// Returns true if the joint at index `joint` moves what one of the `rows` measures: a target that is
+/// not on its axis, or a marker in the image of a camera.
 fn moves_target(fit: &CheckedFit, rows: &[usize], joint: usize) -> bool {
     let table = fit.fitting.measurements;
+    let model = fit.fitting.model;
+    // Frame i is behind joint i, counted from 1; frame 0 is the base.
+    let is_behind = |carrier: Option<usize>| carrier.is_some_and(|frame| frame > joint);
+    let moves_view = |row: &usize| {
+        let observation = table.observation(*row);
+        let [one, other] = model.carriers(observation).map(is_behind);
+        observation.description().needs == Needs::Carriers && one != other
+    };
+    if rows.iter().any(moves_view) {
+        return true;
+    }
     let measures_length = |row: &&usize| table.observation(**row).measures_length();
-    let Some(&row) = rows.iter().find(measures_length) else { return false };
-    let poses = fit.fitting.poses(&[row]);
-    let jacobians = fit.fitting.model.command_jacobian(fit.problem, poses, &fit.end.x);
+    let measured: Vec<usize> = rows.iter().filter(measures_length).copied().collect();
+    let mut poses = fit.fitting.poses(&measured);
+    let mut seen = BTreeSet::new();
+    poses.retain(|pose| seen.insert(pose.target));
+    let jacobians = model.command_jacobian(fit.problem, poses, &fit.end.x);
     jacobians.iter().any(|by_command| by_command.column(joint).norm() > MAX_OFF_AXIS)
 }
