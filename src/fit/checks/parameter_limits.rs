@@ -136,8 +136,8 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
              payload_at, then the prior"
         ));
     }
-    if let ParameterSite::Base { .. } = parameter.site {
-        if let Some(remedy) = euler_remedy(fit) {
+    if let ParameterSite::Base { base, .. } = parameter.site {
+        if let Some(remedy) = euler_remedy(fit, base) {
             return Some(remedy);
         }
         return Some(
@@ -175,15 +175,15 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
 const MAX_EULER_MISMATCH: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
 /// Returns the remedy for Euler angles that are declared as the rotation vector of the base; `None`
-/// unless the fitted base has the rotation that these angles mean.
-fn euler_remedy(fit: &CheckedFit) -> Option<String> {
+/// unless the fitted base of index `base` has the rotation that these angles mean.
+fn euler_remedy(fit: &CheckedFit, base: usize) -> Option<String> {
     let declared = fit.problem.base.rotation;
     let frame = |rotation: &Vector3<f64>| Frame::from_rotation_vector(Vector3::zeros(), rotation);
     let read = Frame::from_xyz_rpy(&Vector3::zeros(), &declared);
     let angle =
         |one: &Frame<f64>, other: &Frame<f64>| rotation_between(&one.axes, &other.axes).norm();
     let bases = fit.fitting.model.base_frames(fit.end.x.as_slice());
-    let fitted = bases.first()?;
+    let fitted = bases.get(base)?;
     let is_read = angle(&read, fitted) < MAX_EULER_MISMATCH;
     let is_other = angle(&read, &frame(&declared)) > 2.0 * MAX_EULER_MISMATCH;
     let shown = |vector: Vector3<f64>| {
