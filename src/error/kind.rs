@@ -223,11 +223,11 @@ pub enum InputErrorKind {
     )]
     PointBehindCamera { fits: Option<bool>, miss: Option<f64> },
     #[error(
-        "the points of the images fit no pose of the marker: they miss the nearest one by {declared:.1} px, \
-         and by {transposed:.1} px with corners along and across exchanged; declare points_mm as the \
-         detector counts them (a board of 10 × 7 instead of 7 × 10)"
+        "the points of the images of camera \"{camera}\" fit no pose of marker \"{marker}\": they miss the nearest one \
+         by {declared:.1} px, and by {transposed:.1} px with corners along and across exchanged; declare points_mm as \
+         the detector counts them (a board of 10 × 7 instead of 7 × 10)"
     )]
-    GridTransposed { declared: f64, transposed: f64 },
+    GridTransposed { camera: String, marker: String, declared: f64, transposed: f64 },
     #[error(
         "the views do not determine the poses of camera \"{camera}\" and marker \"{marker}\": {why}; \
          add such views, or declare at_m and rotation_deg of one of them"

@@ -20,7 +20,7 @@ use crate::bench::{ARM, problem};
 use crate::common::arms::parse;
 use crate::common::made::{draw, model_of, normal};
 use crate::common::program::{Folder, assert_contains};
-use crate::common::reading::{assert_says, problem_error, read_table, table_error};
+use crate::common::reading::{assert_says, problem_error, read_dataset, read_table, table_error};
 
 /// Cameras on the hand, on the base and in the world, and markers on the hand, on a link and in the
 /// world.
@@ -332,8 +332,41 @@ fn a_grid_declared_along_its_other_side_is_named_before_the_fit() {
         .map(|k| Vector3::new(0.03 * f64::from(k % 5), 0.03 * f64::from(k / 5), 0.0))
         .collect();
     let error = identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
-    let expected = ["data.csv:", "fit no pose of the marker", "along and across exchanged"];
+    let expected = ["data.csv:", "fit no pose of marker \"board\"", "along and across exchanged"];
     assert_contains(&error, &expected);
+}
+
+/// Of two boards, the one is named that is declared along its other side, although most images show
+/// the other one.
+#[test]
+fn the_board_declared_along_its_other_side_is_named() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let (camera, after) = read("problem.toml").split_once("[[marker]]").map_or_else(
+        || panic!("no marker"),
+        |(camera, after)| (camera.to_owned(), after.to_owned()),
+    );
+    let marker = after.split_once("[parameters]").unwrap().0.replace("board", "plate");
+    let mut problem = parse(&format!("{camera}[[marker]]{marker}[[marker]]{after}"));
+    let mut views = Vec::new();
+    let text: String = read("data.csv")
+        .lines()
+        .map(|line| {
+            let view = line.split(',').nth(1).unwrap().to_owned();
+            if views.last() != Some(&view) {
+                views.push(view);
+            }
+            let is_of_plate = views.len() % 3 == 0;
+            let line = if is_of_plate { line.replace("board", "plate") } else { line.to_owned() };
+            line + "\n"
+        })
+        .collect();
+    let data = read_dataset(&problem, &text);
+    problem.fixtures[1].points = (0..35)
+        .map(|k| Vector3::new(0.03 * f64::from(k % 5), 0.03 * f64::from(k / 5), 0.0))
+        .collect();
+    let error = identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
+    assert_contains(&error, &["fit no pose of marker \"plate\"", "along and across exchanged"]);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Rows that the nominal arm cannot predict: poses without an equilibrium, and points behind their
 //! camera.
 
+use std::collections::BTreeMap;
+
 use nalgebra::DVector;
 
 use super::fitting::Fitting;
@@ -34,29 +36,42 @@ impl Fitting<'_> {
             lost_pose
                 .or_else(|| self.unlike_marker(&of_cameras, &x))
                 .or_else(|| self.undecided(&of_cameras))
-                .or_else(|| {
-                    let behind = self.behind_camera(&of_cameras, &x);
-                    lost(&of_cameras, &self.located(), behind)
-                })
+                .or_else(|| self.behind_camera(&of_cameras, &x))
         };
         lost(&others, &x, InputErrorKind::NoEquilibrium)
             .or_else(|| if of_cameras.is_empty() { None } else { behind() })
     }
 
-    /// Returns an error about the first of `rows` if the points of most images fit the marker only
-    /// with its grid counted along the other side.
+    /// Returns an error at the first row of a camera and a marker, among `rows`, if the points of
+    /// most of their images fit the marker only with its grid counted along the other side.
     fn unlike_marker(&self, rows: &[usize], x: &DVector<f64>) -> Option<InputError> {
-        let views = SingleViews::of(self.model, &self.poses(rows), x)?;
-        let SingleViews { declared, transposed } = views;
-        let kind = InputErrorKind::GridTransposed { declared, transposed };
-        views.are_transposed().then(|| self.measurements.location(rows[0]).error(kind))
+        let mut pairs: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+        for &row in rows {
+            pairs.entry(self.measurements.observation(row).fixtures()).or_default().push(row);
+        }
+        let error = |([camera, marker], rows): (&[Option<usize>; 2], &Vec<usize>)| {
+            let views = SingleViews::of(self.model, &self.poses(rows), x)?;
+            let SingleViews { declared, transposed } = views;
+            let [camera, marker] = [(*camera)?, (*marker)?].map(|of| self.model.fixture_name(of));
+            let kind = InputErrorKind::GridTransposed { camera, marker, declared, transposed };
+            views.are_transposed().then(|| self.measurements.location(rows[0]).error(kind))
+        };
+        pairs.iter().find_map(error)
     }
 
-    /// Returns the error of a point behind the camera, with what the images by themselves show.
-    fn behind_camera(&self, rows: &[usize], x: &DVector<f64>) -> InputErrorKind {
-        let views = SingleViews::of(self.model, &self.poses(rows), x);
+    /// Returns the error of the first of `rows` whose point is behind the camera, with what the
+    /// images of its camera and marker by themselves show.
+    fn behind_camera(&self, rows: &[usize], x: &DVector<f64>) -> Option<InputError> {
+        let errors = self.position_errors(rows, &self.located());
+        let row = rows[errors.iter().position(|error| error.x.is_nan())?];
+        let pair = |row: usize| self.measurements.observation(row).fixtures();
+        let alike: Vec<usize> =
+            rows.iter().copied().filter(|&other| pair(other) == pair(row)).collect();
+        let views = SingleViews::of(self.model, &self.poses(&alike), x);
         let fits = views.map(|views| !views.miss_the_marker());
-        InputErrorKind::PointBehindCamera { fits, miss: views.map(|views| views.declared) }
+        let miss = views.map(|views| views.declared);
+        let kind = InputErrorKind::PointBehindCamera { fits, miss };
+        Some(self.measurements.location(row).error(kind))
     }
 
     /// Returns an error at the first row of a camera and a marker whose poses the views in `rows`
