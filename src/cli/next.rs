@@ -41,7 +41,7 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to choose
-    #[arg(long, value_name = "K", default_value_t = 5, allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
+    #[arg(long, value_name = "K", default_value_t = DEFAULT_POSES, allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
     poses: u32,
     /// Say "enough" once errors in the workspace are below this, with the probability of --level
     #[arg(long, value_name = "MM", value_parser = parse_positive)]
@@ -54,7 +54,7 @@ pub struct Arguments {
     #[arg(long, value_name = "LOOP.json")]
     explanations: Option<PathBuf>,
     /// Probability with which errors stay below the bound
-    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::parse_level)]
+    #[arg(long, value_name = "P", default_value_t = DEFAULT_LEVEL, value_parser = super::remainder::parse_level)]
     level: f64,
     /// Judge predictions with a remainder fitted to the measured poses, as identify --remainder
     /// makes them
@@ -65,6 +65,38 @@ pub struct Arguments {
     #[command(flatten)]
     source: Source,
 }
+
+impl Arguments {
+    /// Formats the arguments that are not those of the problem and its data, as far as they differ
+    /// from their defaults; each follows a space.
+    fn flags(&self) -> String {
+        let mut words: Vec<String> = Vec::new();
+        if self.poses != DEFAULT_POSES {
+            words.push(format!("--poses {}", self.poses));
+        }
+        words.extend(self.tolerance_mm.map(|most| format!("--tolerance-mm {most}")));
+        if let Some(aim) = self.purpose.to_possible_value()
+            && self.purpose != PurposeArgument::Accuracy
+        {
+            words.push(format!("--for {}", aim.get_name()));
+        }
+        let path = |flag: &str, file: &PathBuf| format!("{flag} {}", shell_word(file));
+        words.extend(self.explanations.iter().map(|file| path("--explanations", file)));
+        if (self.level - DEFAULT_LEVEL).abs() > 0.0 {
+            words.push(format!("--level {}", self.level));
+        }
+        words.extend(self.remainder.then(|| "--remainder".to_owned()));
+        words.extend(self.region.words());
+        words.extend(self.source.candidates.iter().map(|file| path("--pool", file)));
+        words.extend(self.source.truth.iter().map(|file| path("--truth", file)));
+        words.iter().map(|word| format!(" {word}")).collect()
+    }
+}
+
+/// Number of poses without `--poses`.
+const DEFAULT_POSES: u32 = 5;
+/// Probability without `--level`.
+const DEFAULT_LEVEL: f64 = 0.95;
 
 /// Parses a finite number greater than 0.
 fn parse_positive(text: &str) -> Result<f64, String> {
@@ -188,7 +220,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write(&texts)?;
     common.print_result(&json, || {
         let text = report::next_text(&problem, &options, &next);
-        let step = next_step(common, &problem, (&next, options.tolerance), &results);
+        let step = next_step(arguments, &problem, (&next, &options), &results);
         format!("{text}{}Next: {step}\n", results.written())
     })?;
     if !next.found.is_trusted() {
@@ -207,19 +239,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 
 /// States what to do after the choice of poses, with the commands.
 fn next_step(
-    common: &Common,
+    asked: &Arguments,
     problem: &Problem,
-    (next, tolerance): (&NextPoses, Option<f64>),
+    (next, &NextOptions { tolerance, level, .. }): (&NextPoses, &NextOptions),
     results: &Results,
 ) -> String {
+    let common = &asked.common;
     let arguments = common.problem_arguments();
+    let flags = asked.flags();
     // More poses cannot correct a model that lacks an effect.
-    let noise_exceeds = next.noise_exceeds(tolerance);
+    let noise_exceeds = next.noise_exceeds(tolerance, level);
     let lacks = if next.has_large_misfit() && !noise_exceeds {
         let closed = results.path("problem.closed.toml");
         if Problem::read(&closed).is_ok_and(|closed| closed.name == problem.name) {
             return format!(
-                "flexcal next {}{} chooses poses for the problem with the effects that flexcal loop found",
+                "flexcal next {}{flags}{} chooses poses for the problem with the effects that flexcal loop found",
                 shell_word(&closed),
                 common.data_arguments()
             );
@@ -239,24 +273,36 @@ fn next_step(
     let file = shell_word(common.problem());
     if problem.data.joint_log.is_some() {
         return format!(
-            "{lacks}measure these poses, append them to the measurements and to the joint table of {file}, then flexcal next {arguments}"
+            "{lacks}measure these poses, append them to the measurements and to the joint table of {file}, then flexcal next {file}{flags}{}",
+            common.data_arguments()
         );
     }
     let files = common.files(problem);
+    let these = match next.enough_after(tolerance) {
+        Some(enough) if enough < next.poses.len() => format!(
+            "{} (the others are a reserve)",
+            if enough == 1 {
+                "the first pose".to_owned()
+            } else {
+                format!("the first {enough} poses")
+            }
+        ),
+        _ => "these poses".to_owned(),
+    };
     let measure = match files {
         _ if next.is_of_cameras => {
             "take an image in each of these poses, write a row for each point that is found, then"
                 .to_owned()
         }
         [first, ..] => format!(
-            "measure these poses, add the columns x_mm, y_mm, z_mm and the others of {}, then",
+            "measure {these}, add the columns x_mm, y_mm, z_mm and the others of {}, then",
             first.display()
         ),
-        [] => "measure these poses, add the columns x_mm, y_mm, z_mm, then".to_owned(),
+        [] => format!("measure {these}, add the columns x_mm, y_mm, z_mm, then"),
     };
     let measured: Vec<String> = files.iter().map(|file| shell_word(file)).collect();
     format!(
-        "{lacks}{measure} flexcal next {file} --data {} {}",
+        "{lacks}{measure} flexcal next {file}{flags} --data {} {}",
         measured.join(" "),
         shell_word(&results.path("next.csv")),
     )

@@ -26,6 +26,17 @@ impl Region {
     }
 }
 
+impl Region {
+    /// Formats the arguments of the region as they are given on the command line.
+    pub fn words(&self) -> Vec<String> {
+        let listed =
+            |numbers: &[f64]| numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+        let corners = self.workspace_mm.iter().map(|of| format!("--workspace-mm={}", listed(of)));
+        let planes = self.keep_out_mm.iter().map(|of| format!("--keep-out-mm={}", listed(of)));
+        corners.chain(planes).collect()
+    }
+}
+
 /// Parses exactly `N` finite numbers with commas between them.
 pub fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers = text

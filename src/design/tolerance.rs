@@ -1,6 +1,7 @@
 //! Chosen poses against a tolerance of the error over the workspace.
 
 use super::next::{NextPoses, NextStep};
+use super::workspace_error::normal_bound;
 use crate::fit::Noise;
 
 impl NextPoses {
@@ -18,10 +19,12 @@ impl NextPoses {
         self.error.zip(tolerance).is_some_and(|(error, most)| error.least_bound > most)
     }
 
-    /// Returns true if the declared noise alone exceeds the tolerance \[m\], as root mean square.
+    /// Returns true if the declared noise alone exceeds the tolerance \[m\] with a probability of more
+    /// than 1 − `level`.
     #[doc(hidden)]
-    pub fn noise_exceeds(&self, tolerance: Option<f64>) -> bool {
-        let is_below = |most| most < 3_f64.sqrt() * self.noise;
+    pub fn noise_exceeds(&self, tolerance: Option<f64>, level: f64) -> bool {
+        let bound = normal_bound(level) * 3_f64.sqrt() * self.noise;
+        let is_below = |most| most < bound;
         self.found.noise == Noise::Declared && tolerance.is_some_and(is_below)
     }
 

@@ -19,7 +19,7 @@ const CONFIDENCE: f64 = 0.9;
 const REACH_SIGMAS: f64 = 2.0;
 
 /// Returns the quantile of the length of a normal vector in space, relative to its root mean square.
-fn normal_bound(level: f64) -> f64 {
+pub(super) fn normal_bound(level: f64) -> f64 {
     ChiSquared::new(3.0).map_or(0.0, |squares| (squares.inverse_cdf(level) / 3.0).sqrt())
 }
 

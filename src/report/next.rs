@@ -1,7 +1,7 @@
 //! Text and page of the command `next`: the poses to measure next, or that there are enough.
 
 use super::candidates::{candidates_drawn, few_in_view};
-use super::document::{Block, Table, opening};
+use super::document::{Block, Table, code, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
 use super::limited_poses::at_limits;
 use super::render::{page, text};
@@ -28,19 +28,23 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
     let counts = format!(
         "{} fitted; {}; predictions judged at {}",
         counted(next.measured, "row"),
-        candidates_drawn(next.candidates, next.drawn),
+        candidates_drawn(next.candidates, next.drawn, options.workspace.is_some()),
         counted(next.workspace_poses, "pose"),
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(Block::Text(verdict(options, next)));
-    blocks.extend(few_in_view(next.candidates, next.drawn).map(Block::Text));
+    blocks.extend(
+        few_in_view(next.candidates, next.drawn, options.workspace.is_some()).map(Block::Text),
+    );
     blocks.push(Block::Text(error_paragraph(next, percent)));
     if !next.effects.is_empty() {
         let effects = next.effects.iter().map(crate::problem::Effect::describe);
-        blocks.push(Block::Lines(
-            "Effects that the poses distinguish:".to_owned(),
-            effects.collect(),
-        ));
+        let label = if next.effects.len() == 1 {
+            "Effect that the poses test:"
+        } else {
+            "Effects that the poses distinguish:"
+        };
+        blocks.push(Block::Lines(label.to_owned(), effects.collect()));
     }
     blocks.push(Block::figures([draw_errors(options, next, percent)]));
     if !next.steps.is_empty() {
@@ -158,7 +162,7 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         return "Not judged, because the fit to the measured poses is not to be trusted."
             .to_owned();
     }
-    match (next.stop, tolerance, next.enough_after(options.tolerance)) {
+    match (next.stop, tolerance.as_ref(), next.enough_after(options.tolerance)) {
         (Some(StopReason::Enough), Some(tolerance), _) => {
             let incomplete = if next.has_large_misfit() {
                 let ratio = number(next.misfit / next.noise, 1);
@@ -171,7 +175,7 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         (Some(StopReason::GainBelowNoise), Some(tolerance), _) => format!(
             "Further poses gain less than the uncertainty of the error itself, and the bound is above the tolerance of {tolerance} mm: \
              a better {} is needed, not more poses.",
-            lacking(next, options.tolerance)
+            lacking(next, options)
         ),
         (Some(StopReason::GainBelowNoise), None, _) => {
             "Enough: all that further poses can gain is less than the uncertainty of the error itself.".to_owned()
@@ -186,7 +190,7 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         (_, Some(tolerance), None) if next.is_out_of_reach(options.tolerance) => format!(
             "Out of reach: no number of further poses can be expected to bring the bound below the tolerance of {tolerance} mm. A better {} is \
              needed.",
-            lacking(next, options.tolerance)
+            lacking(next, options)
         ),
         (_, Some(tolerance), None) if !next.steps.is_empty() && next.error.is_some() => format!(
             "Not yet enough: after these poses the bound is still expected to be above the tolerance of {tolerance} mm."
@@ -194,13 +198,22 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         _ if next.is_of_cameras => "Further poses lower the variance of predictions as the table says; the error itself is not judged."
             .to_owned(),
         _ if next.error.is_none() => "Not yet enough: too few poses are measured to judge the error.".to_owned(),
-        _ => "Not yet enough: further poses still lower the error.".to_owned(),
+        _ => match (next.error, next.steps.last().and_then(|step| step.error)) {
+            (Some(now), Some(then)) if tolerance.is_none() => format!(
+                "No tolerance is given: {} would lower the bound from {} mm to {} mm. {} says whether that is needed.",
+                counted(next.steps.len(), "more pose"),
+                mm(now.bound, 3),
+                mm(then.bound, 3),
+                code("--tolerance-mm")
+            ),
+            _ => "Not yet enough: further poses still lower the error.".to_owned(),
+        },
     }
 }
 
 /// Names what must be better for the error bound to fall below the tolerance.
-fn lacking(next: &NextPoses, tolerance: Option<f64>) -> &'static str {
-    match (next.noise_exceeds(tolerance), next.has_large_misfit()) {
+fn lacking(next: &NextPoses, &NextOptions { tolerance, level, .. }: &NextOptions) -> &'static str {
+    match (next.noise_exceeds(tolerance, level), next.has_large_misfit()) {
         (true, _) => "instrument",
         (false, true) => "model",
         (false, false) => "model or instrument",

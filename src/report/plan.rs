@@ -100,7 +100,7 @@ fn blocks<'a>(
     let counts = format!(
         "{}{besides}, from {}; criterion {}, best of {}",
         counted(poses, "pose"),
-        candidates_drawn(plan.candidates, plan.drawn),
+        candidates_drawn(plan.candidates, plan.drawn, false),
         criterion_words(criterion),
         counted(plan.starts.len(), "start"),
     );
