@@ -25,7 +25,11 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
             None => "No remainder: too few configurations to fit one.".to_owned(),
         };
     };
-    let predicts = if gain.error.ratio() > 0.0 {
+    let passes =
+        gain.error.ratio() > gain.threshold() && gain.density.ratio() > gain.density_threshold();
+    let predicts = if passes {
+        "predicts left-out configurations better, but does not raise the likelihood enough"
+    } else if gain.error.ratio() > 0.0 {
         "does not clearly predict left-out configurations better"
     } else {
         "predicts left-out configurations no better"
@@ -219,7 +223,7 @@ pub(super) fn chance_of_bound(test: Option<&BoundTest>, noun: &str) -> String {
     }
     match test.filter(|test| test.beyond() as f64 > test.expected_beyond()) {
         Some(test) => format!(
-            " Chance alone leaves at most {} of {} {noun} within their bounds with a probability of {} %: the bounds rest on {}.",
+            " {} of {} {noun} lie within their bounds; as few or fewer do so by chance in {} % of cases. The bounds rest on {}.",
             test.within,
             test.of,
             two_digits(100.0 * test.chance(), 2),

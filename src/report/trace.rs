@@ -94,7 +94,7 @@ fn verdict(result: &TraceResult) -> String {
     }
     let structure = if let Some(size) = result.size_alone() {
         let size = number(size, 1);
-        format!("The residual is {size} × the declared σ, and no structure is seen in it")
+        format!("The residual is {size} × the declared σ, and the residual tests show no structure")
     } else if result.structured {
         "The residual has structure".to_owned()
     } else if !result.is_testable() {
@@ -317,7 +317,7 @@ pub(super) fn ranking<'a>(
         notes.push_str(" The pose to measure is within the measured ranges.");
     }
     vec![
-        Block::heading("Candidate effects, best first"),
+        Block::heading("Candidates of the catalogue, best first"),
         Block::Ranking(points),
         Block::Text(notes),
     ]
