@@ -89,7 +89,7 @@ impl Arguments {
         words.extend(self.region.words());
         words.extend(self.source.candidates.iter().map(|file| path("--pool", file)));
         words.extend(self.source.truth.iter().map(|file| path("--truth", file)));
-        words.iter().map(|word| format!(" {word}")).collect()
+        if words.is_empty() { String::new() } else { format!(" {}", words.join(" ")) }
     }
 }
 
