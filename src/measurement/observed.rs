@@ -256,7 +256,8 @@ pub(super) fn add_known_distances(
         if distance.between.iter().all(|point| is_located(point, &measurements.observations)) {
             measurements.add_known(distance, &problem.data.location.file);
             let observation = measurements.observation(measurements.len() - 1);
-            let mut names = distance.between.map(|point| problem.fixtures[point].name.clone());
+            let name = |point: usize| problem.fixtures.get(point).map(|of| of.name.clone());
+            let mut names = distance.between.map(|point| name(point).unwrap_or_default());
             names.sort_unstable();
             measurements.distance_names.push((observation, names));
         }

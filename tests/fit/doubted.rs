@@ -99,7 +99,7 @@ fn rows_with_the_word_of_another_session_are_named() {
     let (problem, mut data) = arm();
     let exchanged = [10, 20, 50, 55];
     data.measurements.positions[36..].iter_mut().for_each(|at| *at += Vector3::new(1.0, 0.5, 0.0));
-    let words = (0..90).map(|row| if (row < 36) != exchanged.contains(&row) { "A" } else { "B" });
+    let words = (0..90).map(|row| if (row < 36) == exchanged.contains(&row) { "B" } else { "A" });
     data.measurements.session = labels(words);
     let (count, text) = doubted(&fit(&problem, &data)).unwrap();
     assert!(count == 4 && text.contains("they fit in session A or B instead"), "{text}");
