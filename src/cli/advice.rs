@@ -64,7 +64,8 @@ pub fn after_fit(
         }
         // A search for effects would attribute the change to the model, even if the fit is trusted.
         _ if found.has(FindingCode::RowsChanged) => format!(
-            "follow the warning on the row from which on something changed, then flexcal identify {named}"
+            "follow the warning on the row from which on something changed, then flexcal \
+             identify {named}"
         ),
         Some(look) => {
             format!("{look}; if they are right, {search}")
@@ -77,7 +78,8 @@ pub fn after_fit(
             common.problem_file().display()
         ),
         None if found.has(FindingCode::LensContradicted) => format!(
-            "free the intrinsics in [parameters] of {} as the warning says, then flexcal identify {named}",
+            "free the intrinsics in [parameters] of {} as the warning says, then flexcal \
+             identify {named}",
             common.problem_file().display()
         ),
         None if found.has(FindingCode::PositionsComputed) => {
@@ -239,7 +241,8 @@ pub fn after_applying(
     let is_searched = problem.remainder.is_some() || estimate.posterior.has_prior;
     if estimate.posterior.noise_factor > 1.0 && !is_searched {
         return format!(
-            "flexcal loop {fitted} looks for what the model lacks, because the estimate leaves more than noise"
+            "flexcal loop {fitted} looks for what the model lacks, because the estimate leaves \
+             more than noise"
         );
     }
     if measures_no_position(problem) {
@@ -249,8 +252,8 @@ pub fn after_applying(
 }
 
 /// Formats the problem and the measurement files to which an estimate was fitted as arguments of a
-/// suggested command. Those of the problem are meant if the estimate names none, or names files that
-/// do not exist as seen from the current folder.
+/// suggested command. Those of the problem are meant if the estimate names none, or names files
+/// that do not exist as seen from the current folder.
 pub fn fitted_arguments(common: &Common, problem: &Problem, estimate: &SavedEstimate) -> String {
     let named = shell_word(common.problem());
     let files = &estimate.measurement_files;

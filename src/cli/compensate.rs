@@ -158,7 +158,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let reached = commands.iter().filter(|command| command.is_reached()).count();
         let next = if !trusted {
             format!(
-                "flexcal identify {}{} says why the estimate is not to be trusted; correct that, and identify again before commands are corrected",
+                "flexcal identify {}{} says why the estimate is not to be trusted; correct that, \
+                 and identify again before commands are corrected",
                 advice::fitted_arguments(common, &problem, &estimate),
                 advice::strategy_argument(&estimate)
             )
@@ -171,7 +172,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             let these = if reached < commands.len() { "the commands of reached targets" } else { "these commands" };
             format!(
-                "measure with {these}, then flexcal predict {problem_word} --estimate {file} --data MEASURED.csv judges them"
+                "measure with {these}, then flexcal predict {problem_word} --estimate {file} \
+                 --data MEASURED.csv judges them"
             )
         };
         format!(

@@ -104,7 +104,8 @@ fn warn_of_remainder(problem: &Problem, prior: Option<&Path>) {
     let reason =
         if declared.is_used { "declares a remainder of its own" } else { "says use = false" };
     diagnostic::warn(&format!(
-        "the remainder of {} is not carried over, because [remainder] in the problem {reason}; without that section it is",
+        "the remainder of {} is not carried over, because [remainder] in the problem {reason}; \
+         without that section it is",
         prior.display()
     ));
 }

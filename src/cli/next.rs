@@ -253,7 +253,8 @@ fn next_step(
         let closed = results.path("problem.closed.toml");
         if Problem::read(&closed).is_ok_and(|closed| closed.name == problem.name) {
             return format!(
-                "flexcal next {}{flags}{} chooses poses for the problem with the effects that flexcal loop found",
+                "flexcal next {}{flags}{} chooses poses for the problem with the effects that \
+                 flexcal loop found",
                 shell_word(&closed),
                 common.data_arguments()
             );
@@ -273,7 +274,8 @@ fn next_step(
     let file = shell_word(common.problem());
     if problem.data.joint_log.is_some() {
         return format!(
-            "{lacks}measure these poses, append them to the measurements and to the joint table of {file}, then flexcal next {file}{flags}{}",
+            "{lacks}measure these poses, append them to the measurements and to the joint table \
+             of {file}, then flexcal next {file}{flags}{}",
             common.data_arguments()
         );
     }

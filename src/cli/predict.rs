@@ -139,7 +139,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 shell_word(file)
             ),
             (Some(_), Some(estimate)) if trusted && !estimate.posterior.has_prior && test.is_some_and(|of| of.is_contradicted()) => format!(
-                "flexcal loop {} looks for what the model lacks, because fewer rows than foreseen lie within their bounds",
+                "flexcal loop {} looks for what the model lacks, because fewer rows than \
+                 foreseen lie within their bounds",
                 advice::fitted_arguments(common, &problem, estimate)
             ),
             (Some(file), Some(estimate)) => {

@@ -102,7 +102,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let first = watch.causes.first().map(|cause| cause.kind);
         let next = if watch.is_changed() && first == Some(CauseKind::Other) {
             format!(
-                "flexcal identify {} --out {}: if that fit is trusted, the arm has changed or is another one; if not, check units, signs, columns and \
+                "flexcal identify {} --out {}: if that fit is trusted, the arm has changed or is \
+                 another one; if not, check units, signs, columns and \
                  the order of joints",
                 common.problem_arguments(),
                 unused_folder(&arguments.estimate, "check")

@@ -53,9 +53,10 @@ impl<'a> Drawn<'a> {
     }
 }
 
-/// Returns the candidates as two tables, and the number of drawn poses. The first holds the rows given, or poses drawn uniformly
-/// from the ranges; the second holds poses often at the limits of the ranges, if there are ranges.
-/// With a site, poses out of view of its cameras are replaced by others, as far as possible.
+/// Returns the candidates as two tables, and the number of drawn poses. The first holds the rows
+/// given, or poses drawn uniformly from the ranges; the second holds poses often at the limits of
+/// the ranges, if there are ranges. With a site, poses out of view of its cameras are replaced by
+/// others, as far as possible.
 fn tables(
     problem: &Problem,
     candidates: &Candidates,

@@ -296,9 +296,9 @@ impl<'a> Site<'a> {
             .collect()
     }
 
-    /// Draws poses from `ranges` until `count` of them satisfy `select` and are seen by the cameras,
-    /// or [`MAX_DRAWS_PER_VIEW`] times as many were drawn. Without cameras, `count` poses are drawn.
-    /// Returns the poses and the number that was drawn.
+    /// Draws poses from `ranges` until `count` of them satisfy `select` and are seen by the
+    /// cameras, or [`MAX_DRAWS_PER_VIEW`] times as many were drawn. Without cameras, `count` poses
+    /// are drawn. Returns the poses and the number that was drawn.
     pub(super) fn draw_in_view(
         &self,
         ranges: &PoseRanges,

@@ -19,8 +19,8 @@ impl NextPoses {
         self.error.zip(tolerance).is_some_and(|(error, most)| error.least_bound > most)
     }
 
-    /// Returns true if the declared noise alone exceeds the tolerance \[m\] with a probability of more
-    /// than 1 − `level`.
+    /// Returns true if the declared noise alone exceeds the tolerance \[m\] with a probability of
+    /// more than 1 − `level`.
     #[doc(hidden)]
     pub fn noise_exceeds(&self, tolerance: Option<f64>, level: f64) -> bool {
         let bound = normal_bound(level) * 3_f64.sqrt() * self.noise;

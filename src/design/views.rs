@@ -185,8 +185,8 @@ fn in_view<'a>(
 }
 
 impl ViewRule {
-    /// Returns true if the camera of a view is on the right side of a marker with these `points`, at
-    /// a distance within those of the rule.
+    /// Returns true if the camera of a view is on the right side of a marker with these `points`,
+    /// at a distance within those of the rule.
     fn admits(&self, view: &View, points: &[Vector3<f64>]) -> bool {
         let sight = view.sight(middle(points));
         let [near, far] = self.distances;

@@ -18,7 +18,8 @@ const CONFIDENCE: f64 = 0.9;
 /// Standard errors of the expected error by which a tolerance must be too small to be out of reach.
 const REACH_SIGMAS: f64 = 2.0;
 
-/// Returns the quantile of the length of a normal vector in space, relative to its root mean square.
+/// Returns the quantile of the length of a normal vector in space, relative to its root mean
+/// square.
 pub(super) fn normal_bound(level: f64) -> f64 {
     ChiSquared::new(3.0).map_or(0.0, |squares| (squares.inverse_cdf(level) / 3.0).sqrt())
 }

@@ -132,19 +132,26 @@ pub(super) fn behind_camera_remedy(fits: Option<bool>, miss: Option<f64>) -> Str
     let miss = miss.filter(|miss| miss.is_finite());
     let miss = miss.map_or_else(|| "far".to_owned(), |miss| format!("by {miss:.1} px"));
     match fits {
-        Some(true) => "each image by itself fits the marker, so that lens and points are right; check \
-             units (radians under _deg?), signs and order of the joint columns, whether joints and images \
+        Some(true) => {
+            "each image by itself fits the marker, so that lens and points are right; check \
+             units (radians under _deg?), signs and order of the joint columns, whether joints \
+             and images \
              belong together, and at_m and rotation_deg of camera and marker"
-            .to_owned(),
+                .to_owned()
+        }
         Some(false) => format!(
-            "the points of the images fit no pose of the marker, which they miss {miss} without the \
-             arm; check focal_px and centre_px (in pixels, not in millimetres), points_mm, and the numbers \
+            "the points of the images fit no pose of the marker, which they miss {miss} without \
+             the \
+             arm; check focal_px and centre_px (in pixels, not in millimetres), points_mm, and \
+             the numbers \
              in the column point"
         ),
-        None => "check the names and numbers of the row, whether points_mm counts the corners as the \
+        None => {
+            "check the names and numbers of the row, whether points_mm counts the corners as the \
              detector does (10 × 7 or 7 × 10), and the poses of camera and marker (at_m and \
              rotation_deg), which views of one direction do not determine"
-            .to_owned(),
+                .to_owned()
+        }
     }
 }
 

@@ -86,7 +86,8 @@ pub enum UrdfErrorKind {
     #[error("the chain has {found} joints; at most {most}")]
     TooManyJoints { found: usize, most: usize },
     #[error(
-        "the URDF moves joints {} between \"{base}\" and \"{tip}\", the problem {}; give the URDF of which \
+        "the URDF moves joints {} between \"{base}\" and \"{tip}\", the problem {}; give the \
+         URDF of which \
          flexcal init made the problem",
         found.join(", "), expected.join(", ")
     )]
@@ -103,7 +104,8 @@ pub enum UrdfErrorKind {
     )]
     NoRoom { joint: String, off: String },
     #[error(
-        "not an arm with the joint layout of Universal Robots: {why}; --format mdh or dh writes the table of \
+        "not an arm with the joint layout of Universal Robots: {why}; --format mdh or dh writes \
+         the table of \
          any arm, ros-yaml the offsets for ROS, and --urdf ARM.urdf a URDF"
     )]
     NotUr { why: String },

@@ -86,7 +86,8 @@ impl Contradiction {
             "with what was found before, they still do; most probable of the further causes tried"
         };
         let text = format!(
-            "the new rows contradict {} (a false alarm in at most one of 100 fits); {cause}: {} ({:.0} % among them){treatment}",
+            "the new rows contradict {} (a false alarm in at most one of 100 fits); {cause}: {} \
+             ({:.0} % among them){treatment}",
             file.display(),
             self.label,
             100.0 * self.probability

@@ -1,5 +1,5 @@
-//! Causes that move parameters which the problem holds, and free parameters that move the rows in the
-//! same way.
+//! Causes that move parameters which the problem holds, and free parameters that move the rows in
+//! the same way.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -299,7 +299,8 @@ fn contradiction(
         let cause = contradicting_evidence(&test.assessed).and_then(|_| {
             most_probable(&test.assessed, (&test.causes, location), (&test.extended, &test.rows))
         });
-        // Rows that measure something else are tested without the remainder, together with all others.
+        // Rows that measure something else are tested without the remainder, together with all
+        // others.
         let is_tested = |of: Observation| of.is_position() || of.is_point() || !of.is_of_arm();
         let are_all_tested =
             rows.iter().map(|row| data.measurements.observation(*row)).all(is_tested);

@@ -116,9 +116,10 @@ impl SensitiveRows {
         self.residual.rows(row * self.stride, self.stride).into_owned()
     }
 
-    /// Adds a column for each of the first `coordinates` residuals of each row, which is 1 there and
-    /// 0 elsewhere: errors of the predictions, in units of the noise. Returns the index of the first
-    /// column.
+    /// Adds a column for each of the first `coordinates` residuals of each row, which is 1 there
+    /// and
+    /// 0 elsewhere: errors of the predictions, in units of the noise. Returns the index of the
+    /// first column.
     pub fn add_error_columns(&mut self, coordinates: usize) -> usize {
         let (first, added) = (self.sensitivity.ncols(), coordinates * self.len());
         let sensitivity = std::mem::replace(&mut self.sensitivity, DMatrix::zeros(0, 0));

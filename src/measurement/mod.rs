@@ -335,8 +335,9 @@ impl Measurements {
 
     /// Returns a digest of a row, 16 hexadecimal digits. It is computed from joints, measured
     /// numbers, and session, target, payload and time if the table states them. It does not depend
-    /// on the file, nor on the units in which the values are written. The digest of a known distance
-    /// is computed from its points, length and σ alone, so that it is the same with any table.
+    /// on the file, nor on the units in which the values are written. The digest of a known
+    /// distance is computed from its points, length and σ alone, so that it is the same with any
+    /// table.
     pub(crate) fn row_digest(&self, row: usize) -> String {
         let observation = self.observation(row);
         let names = self.distance_names.iter().find(|(of, _)| *of == observation);

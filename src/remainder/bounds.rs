@@ -77,8 +77,8 @@ impl Bounds {
         Self { level, poses, factor: scores.quantile(level), learned_from: scores.configurations }
     }
 
-    /// Compares the bounds with errors that were not fitted. `errors` has for each of them the index
-    /// of its pose in these bounds, its row in `table`, and its length \[m\]. Rows of one
+    /// Compares the bounds with errors that were not fitted. `errors` has for each of them the
+    /// index of its pose in these bounds, its row in `table`, and its length \[m\]. Rows of one
     /// configuration err alike, so they count once with their mean error.
     pub fn test(
         &self,

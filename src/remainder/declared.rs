@@ -66,8 +66,8 @@ pub fn of_estimate(
     uncertainty_of(problem, estimate)
 }
 
-/// Reads the uncertainty of predictions that `estimate` contains; `None` if it contains none of this
-/// problem.
+/// Reads the uncertainty of predictions that `estimate` contains; `None` if it contains none of
+/// this problem.
 fn uncertainty_of(
     problem: &Problem,
     estimate: &SavedEstimate,

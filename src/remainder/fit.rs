@@ -182,7 +182,8 @@ fn training_rows(
         estimate.fitted && estimate.at_bound.is_none()
     };
     let unknowns = (0..found.estimates.len()).filter(is_free).collect();
-    // With it, the noise of the rows is near the scatter of their residuals, where its search begins.
+    // With it, the noise of the rows is near the scatter of their residuals, where its search
+    // begins.
     let squares: f64 = poses.iter().map(|pose| pose.sigma.powi(2)).sum();
     let sigma = (squares / poses.len().max(1) as f64).sqrt();
     let mut linearisation = Linearisation { problem, model, x: &found.x, unknowns, sigma };

@@ -1,8 +1,9 @@
 //! Update of the corrections of an earlier estimate by new rows of the same arm.
 //!
 //! The weights w of the inducing variables and the changes δ of the parameters have one joint
-//! Gaussian posterior, which `remainder.json` contains: means, and the factor of their precision. It
-//! says how the remainder and the parameters are correlated, so it is a complete prior of new rows:
+//! Gaussian posterior, which `remainder.json` contains: means, and the factor of their precision.
+//! It says how the remainder and the parameters are correlated, so it is a complete prior of new
+//! rows:
 //!
 //! 1. The posterior is moved to the new estimate, about which the new rows are linearised. A
 //!    parameter that moved by Δ there has the change δ − Δ, with the same covariance. The corrected
@@ -11,7 +12,8 @@
 //!    remainder is kept; it has no drift besides. Parameters that the model lacks (sessions that
 //!    ended) are marginalised. New ones, and placements that were put down elsewhere, get their
 //!    prior.
-//! 3. The new rows condition w and δ together. [Rasmussen & Williams 2006, section 2.1] The inducing
+//! 3. The new rows condition w and δ together. [Rasmussen & Williams 2006, section 2.1] The
+//!    inducing
 //!    variables stay those of the earlier rows, so that files do not grow over the life of an arm.
 //!    The part of the remainder that these do not represent counts as noise. [Snelson & Ghahramani
 //!    2006]
@@ -107,8 +109,8 @@ impl EarlierCorrections {
     /// Returns the corrections for the estimate `found`, with `since` as the change since the
     /// earlier estimate and the identification rows of `data` as new rows.
     ///
-    /// Rows that measure no position do not condition the corrections; known distances of the problem
-    /// conditioned the earlier ones. `None` if a matrix is not
+    /// Rows that measure no position do not condition the corrections; known distances of the
+    /// problem conditioned the earlier ones. `None` if a matrix is not
     /// positive definite because of rounding.
     ///
     /// # Errors

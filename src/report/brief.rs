@@ -91,7 +91,8 @@ fn remarks(found: &Identification) -> Vec<String> {
         let stand = if found.outliers.len() == 1 { "stands" } else { "stand" };
         if includes_orientation(found, outlier.kind) {
             return format!(
-                "{n} {stand} out from the others by position and orientation together, the farthest at {}: \
+                "{n} {stand} out from the others by position and orientation together, the \
+                 farthest at {}: \
                  {} × the typical scatter",
                 outlier.location,
                 number(outlier.distance, 1)

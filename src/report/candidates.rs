@@ -21,9 +21,9 @@ pub(super) fn candidates_drawn(
     }
 }
 
-/// States that cameras see a marker in few of the `drawn` poses, and what to do; `None` if there are
-/// enough candidates, or if no poses were drawn for cameras. A workspace that is limited leaves out
-/// poses, too.
+/// States that cameras see a marker in few of the `drawn` poses, and what to do; `None` if there
+/// are enough candidates, or if no poses were drawn for cameras. A workspace that is limited leaves
+/// out poses, too.
 pub(super) fn few_in_view(
     candidates: usize,
     drawn: Option<usize>,
@@ -32,8 +32,10 @@ pub(super) fn few_in_view(
     let inside = if is_limited { "lie in the workspace and " } else { "" };
     drawn.filter(|_| candidates < FEW_CANDIDATES).map(|drawn| {
         format!(
-            "Only {candidates} of {drawn} drawn poses {inside}show the marker as the measured views do, so that better poses may exist. Give {} a \
-             table of poses in which the detector finds the marker, or {} a file with narrower ranges of the joints in {}.",
+            "Only {candidates} of {drawn} drawn poses {inside}show the marker as the measured \
+             views do, so that better poses may exist. Give {} a \
+             table of poses in which the detector finds the marker, or {} a file with narrower \
+             ranges of the joints in {}.",
             code("--pool"),
             code("--truth"),
             code("[poses]")

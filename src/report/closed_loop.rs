@@ -355,7 +355,8 @@ fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let limits = (!held.is_empty() && !result.effects.is_empty()).then(|| {
         format!(
             "Limits are active in the declared fit ({held}). If one is wrong, an effect that was found may only compensate for it. \
-             flexcal identify PROBLEM -v shows how far the error would fall if each limit moved out by 1 mm, 1 ° or 1 %."
+             flexcal identify PROBLEM -v shows how far the error would fall if each limit moved \
+             out by 1 mm, 1 ° or 1 %."
         )
     });
     untrusted.into_iter().chain(limits).map(Block::Note).collect()
@@ -412,11 +413,11 @@ fn gain_sentence(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) 
         let (_, unit) = result.after.errors.judged().norms();
         let includes_zero = low <= 0.0 && high >= 0.0;
         let falls = if mean < 0.0 { "rises" } else { "falls" };
-        let [gain, size, low, high] =
-            [mean, mean.abs(), low, high].map(|value| number(value, 4));
+        let [gain, size, low, high] = [mean, mean.abs(), low, high].map(|value| number(value, 4));
         if includes_zero {
             return format!(
-                "With what was found the mean error of the {} does not change measurably (gain {gain} {unit}, {low} to {high} {unit}, \
+                "With what was found the mean error of the {} does not change measurably (gain \
+                 {gain} {unit}, {low} to {high} {unit}, \
                  95 %).",
                 held_out_rows(after)
             );

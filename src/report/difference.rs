@@ -144,7 +144,8 @@ fn remainder_sentences(sides: &[Side; 2]) -> Vec<String> {
             means.map(|(of, error)| format!("{of}: {}", number(*error, 4))).collect();
         (!words.is_empty()).then(|| {
             format!(
-                "Errors of {name} are with its remainder{exception}. The parameters below, without it, give: {}.",
+                "Errors of {name} are with its remainder{exception}. The parameters below, \
+                 without it, give: {}.",
                 words.join("; ")
             )
         })

@@ -64,7 +64,8 @@ fn error_paragraph(next: &NextPoses, percent: &str) -> String {
     match next.error {
         Some(error) => format!(
             "In the workspace the identified arm errs by {} ± {} mm (expected rms, noise included), and by less than {} mm with a \
-             probability of {percent} %.{} {} a misfit of the model of {} mm per axis besides {} mm of noise.",
+             probability of {percent} %.{} {} a misfit of the model of {} mm per axis besides {} \
+             mm of noise.",
             mm(error.expected, 3),
             mm(error.expected_sigma, 3),
             mm(error.bound, 3),
@@ -188,7 +189,8 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
             counted(poses, "more pose")
         ),
         (_, Some(tolerance), None) if next.is_out_of_reach(options.tolerance) => format!(
-            "Out of reach: no number of further poses can be expected to bring the bound below the tolerance of {tolerance} mm. A better {} is \
+            "Out of reach: no number of further poses can be expected to bring the bound below \
+             the tolerance of {tolerance} mm. A better {} is \
              needed.",
             lacking(next, options)
         ),
@@ -200,7 +202,8 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         _ if next.error.is_none() => "Not yet enough: too few poses are measured to judge the error.".to_owned(),
         _ => match (next.error, next.steps.last().and_then(|step| step.error)) {
             (Some(now), Some(then)) if tolerance.is_none() => format!(
-                "No tolerance is given: {} would lower the bound from {} mm to {} mm. {} says whether that is needed.",
+                "No tolerance is given: {} would lower the bound from {} mm to {} mm. {} says \
+                 whether that is needed.",
                 counted(next.steps.len(), "more pose"),
                 mm(now.bound, 3),
                 mm(then.bound, 3),

@@ -210,7 +210,8 @@ pub(super) fn unidentifiable<'a>(
     points.extend(open_scale.filter(|_| quantities.is_empty()).map(str::to_owned));
     points.extend(quantities);
     points.push(
-        "Where no prior decides, fix one parameter of each combination (fixed = true) or give it a prior (sigma_mm, sigma_deg)."
+        "Where no prior decides, fix one parameter of each combination (fixed = true) or give it \
+         a prior (sigma_mm, sigma_deg)."
             .to_owned(),
     );
     Block::Lines(words, points)

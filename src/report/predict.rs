@@ -13,7 +13,8 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, percent_of};
 use crate::remainder::{BoundTest, Bounds};
 
-/// Error bounds of the predicted rows, with their test by the rows that were not fitted; the test is
+/// Error bounds of the predicted rows, with their test by the rows that were not fitted; the test
+/// is
 /// `None` if there are no such rows.
 pub(crate) type Tested<'a> = (&'a Bounds, Option<&'a BoundTest>);
 

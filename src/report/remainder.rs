@@ -80,14 +80,17 @@ fn carried_text(outcome: &Outcome, carried: Carried) -> String {
                 "rows that measure positions".to_owned()
             };
             format!(
-                "The remainder (smooth correction) of the earlier estimate, at {}, was updated with the new {rows}, together with the \
-                 parameters. If each new configuration is predicted from the earlier rows and the other new ones, the mean error is \
+                "The remainder (smooth correction) of the earlier estimate, at {}, was updated \
+                 with the new {rows}, together with the \
+                 parameters. If each new configuration is predicted from the earlier rows and \
+                 the other new ones, the mean error is \
                  {without} mm without the remainder and {with} mm with it.",
                 counted(outcome.joints, "joint"),
             )
         }
         None if outcome.joints > 0 => format!(
-            "The remainder (smooth correction) of the earlier estimate, at {}, was kept unchanged: {why_kept}.",
+            "The remainder (smooth correction) of the earlier estimate, at {}, was kept \
+             unchanged: {why_kept}.",
             counted(outcome.joints, "joint"),
         ),
         None if conditioning == 0 => format!(
@@ -99,7 +102,8 @@ fn carried_text(outcome: &Outcome, carried: Carried) -> String {
     if widening > 1.0 {
         let _ = write!(
             text,
-            " All error bounds were multiplied by {}, because the new rows err more than the earlier ones.",
+            " All error bounds were multiplied by {}, because the new rows err more than the \
+             earlier ones.",
             number(widening, 2)
         );
     }
@@ -208,7 +212,8 @@ fn contradicted_bound(test: Option<&BoundTest>, noun: &str) -> String {
     let (beyond, of) = (test.beyond(), test.of);
     let expected = number(test.expected_beyond(), 1);
     format!(
-        " But {beyond} of {of} {noun} exceed their own bound, and chance explains {expected}: predictions at such poses err \
+        " But {beyond} of {of} {noun} exceed their own bound, and chance explains {expected}: \
+         predictions at such poses err \
          more than the bound says."
     )
 }
@@ -223,7 +228,8 @@ pub(super) fn chance_of_bound(test: Option<&BoundTest>, noun: &str) -> String {
     }
     match test.filter(|test| test.beyond() as f64 > test.expected_beyond()) {
         Some(test) => format!(
-            " {} of {} {noun} lie within their bounds; as few or fewer do so by chance in {} % of cases. The bounds rest on {}.",
+            " {} of {} {noun} lie within their bounds; as few or fewer do so by chance in {} % \
+             of cases. The bounds rest on {}.",
             test.within,
             test.of,
             two_digits(100.0 * test.chance(), 2),
@@ -248,8 +254,8 @@ fn are_predicted(bounds: &Bounds, residuals: &[Residual]) -> bool {
 }
 
 /// States the expected error and its mean bound. With `measured`, which holds the residuals of the
-/// rows and the test of the bounds by rows that were not fitted, adds the share of rows within their
-/// bounds and what the test says.
+/// rows and the test of the bounds by rows that were not fitted, adds the share of rows within
+/// their bounds and what the test says.
 pub(super) fn bound_sentence(
     bounds: &Bounds,
     measured: Option<(&[Residual], Option<&BoundTest>)>,

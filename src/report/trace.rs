@@ -286,7 +286,8 @@ pub(super) fn ranking<'a>(
         return vec![
             Block::heading("Candidate effects"),
             Block::Text(format!(
-                "None of {tried} candidates is significant. The best one, {}, is not clearly better than noise (p {}, corrected for the \
+                "None of {tried} candidates is significant. The best one, {}, is not clearly \
+                 better than noise (p {}, corrected for the \
                  number of candidates; significant below {level}).",
                 declared(&first.effect),
                 p_value(first.p_value),
@@ -310,7 +311,8 @@ pub(super) fn ranking<'a>(
     if shown.iter().any(|candidate| !candidate.alike.is_empty()) {
         notes.push_str(
             " The angle in brackets lies between the displacements by the two effects after all parameters are fitted. At 0° these \
-             poses cannot distinguish the effects, at small angles only precise data can; the probabilities take this into account.",
+             poses cannot distinguish the effects, at small angles only precise data can; the \
+             probabilities take this into account.",
         );
     }
     if shown.iter().any(|candidate| separating_pose(candidate, noise).is_some()) {

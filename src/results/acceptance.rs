@@ -209,8 +209,9 @@ impl AcceptanceResult {
         }
     }
 
-    /// Returns the record with the error bounds of the held-out rows, the share (`coverage`) of rows
-    /// within them, and the test of the bounds by these rows. `remainder` is true if a remainder corrects the predictions.
+    /// Returns the record with the error bounds of the held-out rows, the share (`coverage`) of
+    /// rows within them, and the test of the bounds by these rows. `remainder` is true if a
+    /// remainder corrects the predictions.
     #[must_use]
     pub fn with_bounds(
         self,

@@ -33,8 +33,8 @@ pub struct PredictionErrors {
     /// Share of the rows whose error is within its bound, 0 to 1; absent without bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
-    /// Probability that chance alone leaves as few of the configurations that were not fitted within
-    /// their bounds; absent without bounds or such configurations.
+    /// Probability that chance alone leaves as few of the configurations that were not fitted
+    /// within their bounds; absent without bounds or such configurations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage_p_value: Option<f64>,
     #[serde(flatten)]

@@ -459,8 +459,8 @@ impl Orientation {
     }
 }
 
-/// Returns the rows of the covariance of the fit, with 0 for parameters that were not fitted or rest
-/// on a bound. `None` if a fitted parameter has no standard error.
+/// Returns the rows of the covariance of the fit, with 0 for parameters that were not fitted or
+/// rest on a bound. `None` if a fitted parameter has no standard error.
 fn covariance_of_predictions(found: &Identification) -> Option<Vec<Box<RawValue>>> {
     let is_free = |k: usize| found.estimates[k].fitted && found.estimates[k].at_bound.is_none();
     let n = found.estimates.len();

@@ -12,4 +12,5 @@ pub(super) mod predict_saved;
 pub(super) mod predicted_covariance;
 pub(super) mod saved_estimate;
 pub(super) mod saved_estimate_error;
+mod saved_posterior;
 pub(super) mod tolerance;

@@ -18,22 +18,22 @@ use crate::model::parameter::{JointField, Parameter, ParameterSite, Regressor};
 use crate::problem::{JointKind, Problem};
 use crate::random;
 
-/// Smallest ratio of the noise variance that the fit assumed to the declared one, at which the order
-/// of the rows is examined.
+/// Smallest ratio of the noise variance that the fit assumed to the declared one, at which the
+/// order of the rows is examined.
 const MIN_NOISE_FACTOR: f64 = 4.0;
 /// Smallest share of the misfit beyond the declared noise that a change explains.
 const MIN_EXPLAINED: f64 = 0.8;
 /// Largest probability of a reported change by chance (F test), times the number of tries.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-6;
-/// Smallest ratio of the residual that a change leaves in another order of the rows, or that a drift
-/// over the rows leaves, to that in the order of the table.
+/// Smallest ratio of the residual that a change leaves in another order of the rows, or that a
+/// drift over the rows leaves, to that in the order of the table.
 const MIN_OTHER_RATIO: f64 = 2.0;
 /// Largest number of rows and of unknowns for which the order is examined. The time of an order
-/// grows with the product of the number of rows and the square of the number of unknowns, and, for a
-/// fixed number of rows, with the cube of the number of unknowns.
+/// grows with the product of the number of rows and the square of the number of unknowns, and, for
+/// a fixed number of rows, with the cube of the number of unknowns.
 const MAX_SIZE: [usize; 2] = [4000, 150];
-/// Smallest probability of a residual as large as that of two arms, by noise alone. A larger residual
-/// shows that the model lacks something, which two arms approximate better than one.
+/// Smallest probability of a residual as large as that of two arms, by noise alone. A larger
+/// residual shows that the model lacks something, which two arms approximate better than one.
 const MIN_NOISE_PROBABILITY: f64 = 1e-3;
 /// Number of random orders of the rows.
 const RANDOM_ORDERS: usize = 19;
@@ -137,8 +137,9 @@ fn freedom_of(linear: &Linear, step: &Step) -> f64 {
 }
 
 /// Returns the columns by whose values the rows are sorted into other orders: joints, their
-/// directions of approach, payload, hoist force, temperature, covariates, and the place of the target
-/// in the frame of the base. The place is predicted, so that a moved instrument does not change it.
+/// directions of approach, payload, hoist force, temperature, covariates, and the place of the
+/// target in the frame of the base. The place is predicted, so that a moved instrument does not
+/// change it.
 fn other_columns(fit: &CheckedFit, order: &[usize]) -> Vec<Vec<f64>> {
     let table = fit.fitting.measurements;
     let rows: Vec<usize> =
@@ -236,7 +237,8 @@ fn finding(
     let (what, remedy) = match step.place {
         Place::Target(_) => (
             format!("the target sits {:.1} mm elsewhere in its frame", 1e3 * length(0)),
-            "if the reflector was put into another nest, or the tool was changed, give these rows another \
+            "if the reflector was put into another nest, or the tool was changed, give these \
+             rows another \
              word in a column target"
                 .to_owned(),
         ),
@@ -246,7 +248,8 @@ fn finding(
                 1e3 * length(0),
                 length(1).to_degrees()
             ),
-            "if the instrument or the arm was moved, give these rows another word in a column session"
+            "if the instrument or the arm was moved, give these rows another word in a column \
+             session"
                 .to_owned(),
         ),
         Place::Zero(joint) => {
@@ -257,14 +260,16 @@ fn finding(
             };
             (
                 format!("the zero position of joint {} is off by {by}", joint + 1),
-                "if the joint lost its zero position there (a slipped belt, a new reference run), fit the \
+                "if the joint lost its zero position there (a slipped belt, a new reference \
+                 run), fit the \
                  rows before and after by themselves"
                     .to_owned(),
             )
         }
         Place::Arm => (
             "the arm is another one".to_owned(),
-            "the rows before and after fit by themselves, but not together: check whether they are of one \
+            "the rows before and after fit by themselves, but not together: check whether they \
+             are of one \
              arm with one set-up, and fit them by themselves"
                 .to_owned(),
         ),
@@ -272,7 +277,8 @@ fn finding(
     let before = (linear.cost / linear.freedom).sqrt();
     let after = (step.cost / freedom_of(linear, step)).sqrt();
     let text = format!(
-        "from {location} on ({} of {} rows) {what}: this change would leave, as linearised, a residual of \
+        "from {location} on ({} of {} rows) {what}: this change would leave, as linearised, a \
+         residual of \
          {after:.1} times the declared σ instead of {before:.1}",
         order.len() - step.first,
         order.len()

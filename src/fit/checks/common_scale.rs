@@ -39,8 +39,10 @@ impl Check for ScaleHolds {
         let side = if error > 0.0 { "longer" } else { "shorter" };
         let sigmas = score.abs();
         let text = format!(
-            "a common factor of {:.4} explains the fitted lengths of the arm ({lengths} lengths, of which the \
-             measurements determine about {determined:.0}): they are {:.2} % {side} than declared, {sigmas:.1} σ beyond what \
+            "a common factor of {:.4} explains the fitted lengths of the arm ({lengths} lengths, \
+             of which the \
+             measurements determine about {determined:.0}): they are {:.2} % {side} than \
+             declared, {sigmas:.1} σ beyond what \
              their priors allow",
             1.0 + error,
             100.0 * error.abs()
@@ -60,7 +62,8 @@ fn remedy(fit: &CheckedFit, factor: f64) -> String {
         let print = marker.and_then(|marker| spacing(fit.fitting.model.marker_points(marker)));
         let print = print.map_or_else(String::new, |spacing| {
             format!(
-                " (measure the print: points 0 and 1 are declared {:.3} mm apart, the declared lengths of the arm \
+                " (measure the print: points 0 and 1 are declared {:.3} mm apart, the declared \
+                 lengths of the arm \
                  say {:.3} mm)",
                 spacing * 1e3,
                 spacing * 1e3 / factor
@@ -74,7 +77,8 @@ fn remedy(fit: &CheckedFit, factor: f64) -> String {
         let name = |point: usize| fit.problem.fixtures.get(point).map_or("", |of| of.name.as_str());
         let [from, to] = distance.between.map(name);
         format!(
-            "\"{from}\" to \"{to}\" is declared {:.3} mm, the declared lengths of the arm say {:.3} mm",
+            "\"{from}\" to \"{to}\" is declared {:.3} mm, the declared lengths of the arm say \
+             {:.3} mm",
             distance.length * 1e3,
             distance.length * 1e3 / factor
         )
@@ -111,8 +115,8 @@ struct CommonFactor {
     score: f64,
     /// Score of the lengths without the most informative one.
     others: f64,
-    /// Scatter of the deviations about the common factor, relative to what the factor explains; both
-    /// are sums of squares in units of the priors.
+    /// Scatter of the deviations about the common factor, relative to what the factor explains;
+    /// both are sums of squares in units of the priors.
     unexplained: f64,
     /// Number of lengths.
     lengths: usize,
@@ -160,7 +164,8 @@ impl CommonFactor {
         }
         let explained = error * (&determined * &nominal);
         let rest = (&deviations - &explained).norm_squared();
-        // The usual scatter within the priors, up to two of its standard deviations, is no objection.
+        // The usual scatter within the priors, up to two of its standard deviations, is no
+        // objection.
         let usual = freedom + 2.0 * (2.0 * freedom).sqrt();
         let unexplained = (rest - usual).max(0.0) / explained.norm_squared();
         let scatter = (rest / freedom).max(1.0).sqrt();
@@ -173,8 +178,8 @@ impl CommonFactor {
         Some(Self { error, score, others, unexplained, lengths: n, determined })
     }
 
-    /// Returns true if the factor is far beyond what the priors allow, more than one length supports
-    /// it, and the lengths deviate in proportion.
+    /// Returns true if the factor is far beyond what the priors allow, more than one length
+    /// supports it, and the lengths deviate in proportion.
     fn is_clear(&self) -> bool {
         self.error.abs() > MIN_SCALE_ERROR
             && self.score.abs() > MAX_PRIOR_SIGMAS

@@ -115,7 +115,8 @@ finding_codes! {
         "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",
         "check axes of the measuring frame, signs of joints, units, and the prior";
     ScaleContradicted: Error "scale-contradicted" ["error", "sigmas", "lengths"]
-        "All fitted lengths of the arm together deviate from nominal by one factor, more than 0.3 % and more than 5 standard deviations beyond their priors.",
+        "All fitted lengths of the arm together deviate from nominal by one factor, more than \
+         0.3 % and more than 5 standard deviations beyond their priors.",
         "check the lengths that scale the measurements, or the joint table";
     BeyondArmSize: Error "beyond-arm-size" ["parameter", "sizes"]
         "A parameter deviates by more than the size of the arm, half a turn, or a factor of 100.",
@@ -151,7 +152,10 @@ finding_codes! {
         "A joint stands still in all fitted rows, or no joint turns by more than 10°, so that the fit says little about other poses.",
         "if the arm will move beyond these values, measure poses in which all joints move (flexcal plan chooses them)";
     RowsChanged: Warning "rows-changed" ["row", "place", "before", "after"]
-        "From a row on, one place of the model (target, base, a joint's zero position, or the whole arm) is different: this change explains more than four fifths of what noise does not, neither another order of the rows nor a drift does; the whole arm is named only if both parts then fit within the declared noise.",
+        "From a row on, one place of the model (target, base, a joint's zero position, or the \
+         whole arm) is different: this change explains more than four fifths of what noise does \
+         not, neither another order of the rows nor a drift does; the whole arm is named only if \
+         both parts then fit within the declared noise.",
         "check what changed between these rows, and fit the rows before and after by themselves";
     NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
         "The nominal arm misses the measurements by more than a tenth of their spread.",
@@ -203,7 +207,8 @@ finding_codes! {
         "measure more poses of this session, or give its base a prior";
     UnsteadyPoint: Warning "unsteady-point" ["point", "times", "share"]
         "The predictions at one touched point scatter far more than at the others, and along one direction.",
-        "check whether the point moved or gave way; if it moved, declare a further [[point]] and name that one in the rows after the move";
+        "check whether the point moved or gave way; if it moved, declare a further [[point]] and \
+         name that one in the rows after the move";
     Outliers: Note "outliers" ["rows", "of"]
         "Some identification rows are farther from the fit than noise explains.",
         "look at these rows; a section [robust] limits their influence";

@@ -96,7 +96,8 @@ impl Check for ReadAsMeant {
                 format!("{rest} instead of {as_read}")
             };
             let text = format!(
-                "the measurements fit if they are read in another way: with {named}{more}, the error would be {instead}"
+                "the measurements fit if they are read in another way: with {named}{more}, the \
+                 error would be {instead}"
             );
             return vec![Finding::new(FindingCode::Misread, numbers, text)];
         }

@@ -201,7 +201,8 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     } else if cause_text.is_none() && fit.ignores_elasticity() {
         for finding in findings.iter_mut().filter(|found| OF_RIGID_ARM.contains(&found.code)) {
             *finding = finding.clone().with_remedy(
-                "strategy rigid ignores the elasticity that the problem declares, so fit with strategy joint"
+                "strategy rigid ignores the elasticity that the problem declares, so fit with \
+                 strategy joint"
                     .to_owned(),
             );
         }
@@ -245,10 +246,12 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             | FindingCode::HeldOutOutliers
                 if is_far_off =>
             {
-                "find first why the fitted rows are missed; more poses or other priors do not mend that"
+                "find first why the fitted rows are missed; more poses or other priors do not \
+                 mend that"
             }
             FindingCode::HeldOutOutliers if is_beyond_noise => {
-                "the fitted rows are off too: look first for what the model lacks with flexcal loop, \
+                "the fitted rows are off too: look first for what the model lacks with flexcal \
+                 loop, \
                  then at these rows"
             }
             _ => continue,

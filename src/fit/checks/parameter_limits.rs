@@ -132,7 +132,8 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
         let unit = STIFFNESS_UNITS.iter().find(|(factor, _)| (ratio / factor).ln().abs() < 0.2);
         let unit = unit.map_or(String::new(), |(_, unit)| format!(", as one in {unit} would be"));
         return Some(format!(
-            "the fitted stiffness is {ratio:.3} times the declared one{unit}; check its unit, those of masses and \
+            "the fitted stiffness is {ratio:.3} times the declared one{unit}; check its unit, \
+             those of masses and \
              payload_at, then the prior"
         ));
     }
@@ -197,7 +198,8 @@ fn euler_remedy(fit: &CheckedFit, base: usize) -> Option<String> {
     let vector = rotation_between(&frame(&Vector3::zeros()).axes, &read.axes);
     (is_read && is_other).then(|| {
         format!(
-            "rotation_deg of [base] is a rotation vector; [{}] fits as Euler angles (roll, pitch, yaw), which are \
+            "rotation_deg of [base] is a rotation vector; [{}] fits as Euler angles (roll, \
+             pitch, yaw), which are \
              rotation_deg = [{}]",
             shown(declared),
             shown(vector)

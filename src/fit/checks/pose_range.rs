@@ -82,7 +82,8 @@ impl Check for PosesSpread {
         };
         let verb = if still.len() == 1 { "stays" } else { "stay" };
         let text = format!(
-            "{} {verb}{place} in all fitted rows, so that the fit says little about predictions with other \
+            "{} {verb}{place} in all fitted rows, so that the fit says little about predictions \
+             with other \
              values",
             names.join(", ")
         );
@@ -90,8 +91,8 @@ impl Check for PosesSpread {
     }
 }
 
-/// Returns true if the joint at index `joint` moves what one of the `rows` measures: a target that is
-/// not on its axis, or a marker in the image of a camera.
+/// Returns true if the joint at index `joint` moves what one of the `rows` measures: a target that
+/// is not on its axis, or a marker in the image of a camera.
 fn moves_target(fit: &CheckedFit, rows: &[usize], joint: usize) -> bool {
     let table = fit.fitting.measurements;
     let model = fit.fitting.model;

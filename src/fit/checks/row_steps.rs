@@ -136,8 +136,8 @@ impl Linear {
         (cost.is_finite() && cost > 0.0).then_some(linear)
     }
 
-    /// Returns the best change of one place that is not the whole arm, in an order of the rows: from
-    /// one of the rows on, at which `may_begin` is true, the place has another value.
+    /// Returns the best change of one place that is not the whole arm, in an order of the rows:
+    /// from one of the rows on, at which `may_begin` is true, the place has another value.
     pub fn best_of_places(
         &self,
         places: &Places,
@@ -205,14 +205,14 @@ impl Linear {
         MIN_ROWS.max((2 * self.jacobian.ncols()).div_ceil(self.coordinates.max(1)))
     }
 
-    /// Returns the best change of all unknowns in an order of the rows, from one of the rows `firsts`
-    /// on.
+    /// Returns the best change of all unknowns in an order of the rows, from one of the rows
+    /// `firsts` on.
     pub fn best_of_arm(&self, order: &[usize], firsts: &[usize]) -> Option<Step> {
         self.arm_in(order, firsts).map(|(step, _)| step)
     }
 
-    /// Returns the best change of all unknowns in an order of the rows, from any row on: the best of
-    /// the evenly spaced rows, then rows beside it at distances that are halved.
+    /// Returns the best change of all unknowns in an order of the rows, from any row on: the best
+    /// of the evenly spaced rows, then rows beside it at distances that are halved.
     pub fn best_of_arm_refined(&self, order: &[usize]) -> Option<Step> {
         let firsts = self.arm_rows(order.len(), &|_| true);
         let least = self.least_arm_rows();
@@ -251,7 +251,8 @@ impl Linear {
         best
     }
 
-    /// Adds rows to the sums, or takes rows off, so that they begin at the row `first` of the order.
+    /// Adds rows to the sums, or takes rows off, so that they begin at the row `first` of the
+    /// order.
     fn move_first(&self, sums: &mut ArmSums, order: &[usize], first: usize) {
         let (range, sign): (Range<usize>, f64) =
             if first < sums.first { (first..sums.first, 1.0) } else { (sums.first..first, -1.0) };
@@ -281,8 +282,8 @@ impl Linear {
         Some(Step { place: Place::Arm, first: sums.first, cost, change, columns })
     }
 
-    /// Returns by how much the cost falls with free changes of some unknowns in the summed rows, and
-    /// these changes.
+    /// Returns by how much the cost falls with free changes of some unknowns in the summed rows,
+    /// and these changes.
     fn explained(
         &self,
         (normal, crossed, right): (&DMatrix<f64>, &DMatrix<f64>, &DVector<f64>),

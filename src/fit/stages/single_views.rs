@@ -19,8 +19,8 @@ const MAX_GRID_ERROR: f64 = 1e-6;
 const MIN_POINTS: usize = 6;
 /// Maximum number of views that are fitted by themselves.
 const MAX_VIEWS: usize = 40;
-/// Smallest rms error of views by themselves \[px\] that shows a mistake in camera or marker: lenses
-/// that are not calibrated leave a few pixels.
+/// Smallest rms error of views by themselves \[px\] that shows a mistake in camera or marker:
+/// lenses that are not calibrated leave a few pixels.
 const MIN_MISS: f64 = 10.0;
 /// Largest ratio of the rms error with points counted along the other side to that as declared, at
 /// which they are counted so.

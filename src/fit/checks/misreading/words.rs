@@ -164,13 +164,15 @@ impl fmt::Display for Misreading {
             Self::Gradians => f.write_str("joint angles that are gradians, declared as degrees"),
             Self::OppositeOrder => f.write_str("columns of all joints in the opposite order"),
             Self::Alphabetical => f.write_str(
-                "columns of all joints in the alphabetical order of the joints' names (as in ROS joint_states; name the columns after the joints)",
+                "columns of all joints in the alphabetical order of the joints' names (as in ROS \
+                 joint_states; name the columns after the joints)",
             ),
             Self::TextOrder { is_of_joints, .. } => {
                 let what = if is_of_joints { "joint angles" } else { "positions" };
                 write!(
                     f,
-                    "{what} whose rows are sorted by the text of their numbers (1, 10, 11, …, 2; join the tables by name or number, not by order)"
+                    "{what} whose rows are sorted by the text of their numbers (1, 10, 11, …, 2; \
+                     join the tables by name or number, not by order)"
                 )
             }
             Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
