@@ -1,12 +1,11 @@
 //! Life of an arm: an earlier estimate as the prior of a new one, and tests for a change since
 //! then.
 //!
-//! [`update()`] fits new rows with the posterior of an earlier estimate as prior. Rows
-//! of the earlier fit are not used again. The prior is widened by drift, and in parameters in which
-//! the new rows contradict it. [`update()`] carries the remainder of the earlier estimate over,
-//! too. [`watch()`] tests new rows one after the other for a change since the estimate. [`fleet()`]
-//! finds mean and spread of the parameters of several arms of one type, which serve as the prior of
-//! the next one.
+//! [`update()`] fits new rows with the posterior of an earlier estimate as prior, and carries its
+//! remainder over. Rows of the earlier fit are not used again. The prior is widened by drift, and in
+//! parameters in which the new rows contradict it. [`watch()`] tests new rows one after the other
+//! for a change since the estimate. [`fleet()`] finds mean and spread of the parameters of several
+//! arms of one type, which serve as the prior of the next one.
 
 mod assessment;
 mod causes;
