@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 from pathlib import Path
+from typing import Any
 
 import flexcal
 import numpy as np
@@ -155,9 +156,16 @@ def test_tables_in_memory(lunar: flexcal.Problem, identified: flexcal.Identifica
         pyarrow.Table.from_pandas(frame),
         dictionary,
     ]
+    def nameless(text: str) -> Any:
+        """A result without the names of its files, which tables in memory do not have."""
+        document = timeless(text)
+        for part in (document, document["digest"]):
+            part.pop("measurement_files", None)
+        return document
+
     for table in tables:
         result = lunar.identify(table)
-        assert timeless(result.to_json()) == timeless(identified.to_json()), type(table)
+        assert nameless(result.to_json()) == nameless(identified.to_json()), type(table)
 
 
 @pytest.mark.skipif(not UR10_DATA[0].exists(), reason="the UR10's data are not here")
