@@ -224,10 +224,9 @@ pub enum InputErrorKind {
     PointBehindCamera { fits: Option<bool>, miss: Option<f64> },
     #[error(
         "the points of the images of camera \"{camera}\" fit no pose of marker \"{marker}\": \
-         they miss the nearest one \
-         by {declared:.1} px, and by {transposed:.1} px with corners along and across exchanged; \
-         declare points_mm as \
-         the detector counts them (a board of 10 × 7 instead of 7 × 10)"
+         they miss the nearest one by {declared:.1} px, and by {transposed:.1} px with corners \
+         along and across exchanged; declare points_mm as the detector counts them (a board of \
+         10 × 7 instead of 7 × 10)"
     )]
     GridTransposed { camera: String, marker: String, declared: f64, transposed: f64 },
     #[error(

@@ -135,16 +135,13 @@ pub(super) fn behind_camera_remedy(fits: Option<bool>, miss: Option<f64>) -> Str
         Some(true) => {
             "each image by itself fits the marker, so that lens and points are right; check \
              units (radians under _deg?), signs and order of the joint columns, whether joints \
-             and images \
-             belong together, and at_m and rotation_deg of camera and marker"
+             and images belong together, and at_m and rotation_deg of camera and marker"
                 .to_owned()
         }
         Some(false) => format!(
             "the points of the images fit no pose of the marker, which they miss {miss} without \
-             the \
-             arm; check focal_px and centre_px (in pixels, not in millimetres), points_mm, and \
-             the numbers \
-             in the column point"
+             the arm; check focal_px and centre_px (in pixels, not in millimetres), points_mm, \
+             and the numbers in the column point"
         ),
         None => {
             "check the names and numbers of the row, whether points_mm counts the corners as the \

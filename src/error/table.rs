@@ -145,9 +145,8 @@ pub enum TableErrorKind {
     AllMissing,
     #[error(
         "no row depends on the arm: camera \"{camera}\" and marker \"{marker}\" both stand on \
-         \"world\", as all \
-         cameras and markers of the rows do; declare the frame that carries one of them, as in \
-         on = \"tool\""
+         \"world\", as all cameras and markers of the rows do; declare the frame that carries \
+         one of them, as in on = \"tool\""
     )]
     NothingMoves { camera: String, marker: String },
     #[error(
@@ -213,8 +212,7 @@ pub enum TableErrorKind {
     ColumnLength { expected: usize, found: usize },
     #[error(
         "the row has {found} fields, the header {expected}, and the file ends here without a \
-         line end: it \
-         was probably cut off; copy or export it again, or remove this line"
+         line end: it was probably cut off; copy or export it again, or remove this line"
     )]
     RowCut { expected: usize, found: usize },
     #[error("the row has {found} fields, the header {expected}{}", decimal_comma_remedy(*found, *expected))]

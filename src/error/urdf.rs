@@ -87,8 +87,7 @@ pub enum UrdfErrorKind {
     TooManyJoints { found: usize, most: usize },
     #[error(
         "the URDF moves joints {} between \"{base}\" and \"{tip}\", the problem {}; give the \
-         URDF of which \
-         flexcal init made the problem",
+         URDF of which flexcal init made the problem",
         found.join(", "), expected.join(", ")
     )]
     OtherJoints { base: String, tip: String, found: Vec<String>, expected: Vec<String> },
@@ -105,8 +104,7 @@ pub enum UrdfErrorKind {
     NoRoom { joint: String, off: String },
     #[error(
         "not an arm with the joint layout of Universal Robots: {why}; --format mdh or dh writes \
-         the table of \
-         any arm, ros-yaml the offsets for ROS, and --urdf ARM.urdf a URDF"
+         the table of any arm, ros-yaml the offsets for ROS, and --urdf ARM.urdf a URDF"
     )]
     NotUr { why: String },
 }

@@ -182,8 +182,8 @@ fn training_rows(
         estimate.fitted && estimate.at_bound.is_none()
     };
     let unknowns = (0..found.estimates.len()).filter(is_free).collect();
-    // With it, the noise of the rows is near the scatter of their residuals, where its search
-    // begins.
+    // With the root mean square of the σ as unit of the relative σ, the noise is near the scatter of
+    // the residuals, where its search begins.
     let squares: f64 = poses.iter().map(|pose| pose.sigma.powi(2)).sum();
     let sigma = (squares / poses.len().max(1) as f64).sqrt();
     let mut linearisation = Linearisation { problem, model, x: &found.x, unknowns, sigma };

@@ -130,7 +130,7 @@ impl TrainingRows {
         let within = (within / repeated.max(1) as f64)
             .clamp(MIN_NOISE_SHARE * relative_variance, relative_variance);
         let whole = sum_over(&|row, axis| coordinate(row, axis).powi(2)) / freedom;
-        let own = sum_over(&|row, _| within * relative(row).powi(2)) / coordinates;
-        Hyperparameters::without_remainder(within.sqrt(), (whole - own).max(0.0).sqrt())
+        let independent = sum_over(&|row, _| within * relative(row).powi(2)) / coordinates;
+        Hyperparameters::without_remainder(within.sqrt(), (whole - independent).max(0.0).sqrt())
     }
 }

@@ -92,8 +92,7 @@ fn remarks(found: &Identification) -> Vec<String> {
         if includes_orientation(found, outlier.kind) {
             return format!(
                 "{n} {stand} out from the others by position and orientation together, the \
-                 farthest at {}: \
-                 {} × the typical scatter",
+                 farthest at {}: {} × the typical scatter",
                 outlier.location,
                 number(outlier.distance, 1)
             );

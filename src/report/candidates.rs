@@ -33,9 +33,8 @@ pub(super) fn few_in_view(
     drawn.filter(|_| candidates < FEW_CANDIDATES).map(|drawn| {
         format!(
             "Only {candidates} of {drawn} drawn poses {inside}show the marker as the measured \
-             views do, so that better poses may exist. Give {} a \
-             table of poses in which the detector finds the marker, or {} a file with narrower \
-             ranges of the joints in {}.",
+             views do, so that better poses may exist. Give {} a table of poses in which the \
+             detector finds the marker, or {} a file with narrower ranges of the joints in {}.",
             code("--pool"),
             code("--truth"),
             code("[poses]")

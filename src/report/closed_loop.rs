@@ -417,8 +417,7 @@ fn gain_sentence(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) 
         if includes_zero {
             return format!(
                 "With what was found the mean error of the {} does not change measurably (gain \
-                 {gain} {unit}, {low} to {high} {unit}, \
-                 95 %).",
+                 {gain} {unit}, {low} to {high} {unit}, 95 %).",
                 held_out_rows(after)
             );
         }

@@ -118,9 +118,8 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
             [identified.mean.norm, identified.max.norm].map(|of| mm(of, 4));
         Block::Text(format!(
             "In random poses within the joint limits (and --workspace-mm), {}, the whole model \
-             differs from the exported geometry by \
-             {mean} mm on average ({max} mm at most), from the identified geometry by \
-             {other_mean} mm ({other_max} mm at most).",
+             differs from the exported geometry by {mean} mm on average ({max} mm at most), from \
+             the identified geometry by {other_mean} mm ({other_max} mm at most).",
             if remarks.payload > 0.0 {
                 format!("with payloads up to {} kg", number(remarks.payload, 2))
             } else {

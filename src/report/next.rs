@@ -190,8 +190,7 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         ),
         (_, Some(tolerance), None) if next.is_out_of_reach(options.tolerance) => format!(
             "Out of reach: no number of further poses can be expected to bring the bound below \
-             the tolerance of {tolerance} mm. A better {} is \
-             needed.",
+             the tolerance of {tolerance} mm. A better {} is needed.",
             lacking(next, options)
         ),
         (_, Some(tolerance), None) if !next.steps.is_empty() && next.error.is_some() => format!(

@@ -81,9 +81,8 @@ fn carried_text(outcome: &Outcome, carried: Carried) -> String {
             };
             format!(
                 "The remainder (smooth correction) of the earlier estimate, at {}, was updated \
-                 with the new {rows}, together with the \
-                 parameters. If each new configuration is predicted from the earlier rows and \
-                 the other new ones, the mean error is \
+                 with the new {rows}, together with the parameters. If each new configuration is \
+                 predicted from the earlier rows and the other new ones, the mean error is \
                  {without} mm without the remainder and {with} mm with it.",
                 counted(outcome.joints, "joint"),
             )
@@ -213,8 +212,7 @@ fn contradicted_bound(test: Option<&BoundTest>, noun: &str) -> String {
     let expected = number(test.expected_beyond(), 1);
     format!(
         " But {beyond} of {of} {noun} exceed their own bound, and chance explains {expected}: \
-         predictions at such poses err \
-         more than the bound says."
+         predictions at such poses err more than the bound says."
     )
 }
 

@@ -287,8 +287,8 @@ pub(super) fn ranking<'a>(
             Block::heading("Candidate effects"),
             Block::Text(format!(
                 "None of {tried} candidates is significant. The best one, {}, is not clearly \
-                 better than noise (p {}, corrected for the \
-                 number of candidates; significant below {level}).",
+                 better than noise (p {}, corrected for the number of candidates; significant \
+                 below {level}).",
                 declared(&first.effect),
                 p_value(first.p_value),
             )),

@@ -195,7 +195,7 @@ fn is_explained_otherwise(
         let poses: Vec<usize> = sorted.iter().map(|&place| order[place]).collect();
         explains(&poses, &is_new)
     };
-    // Without a factor of the drift it is not known to explain less.
+    // A drift whose cost cannot be computed might explain as much.
     let drifts = |columns: &Vec<usize>| {
         linear.cost_of_drift(step.place, columns, order).is_none_or(|cost| cost < most)
     };
@@ -238,8 +238,7 @@ fn finding(
         Place::Target(_) => (
             format!("the target sits {:.1} mm elsewhere in its frame", 1e3 * length(0)),
             "if the reflector was put into another nest, or the tool was changed, give these \
-             rows another \
-             word in a column target"
+             rows another word in a column target"
                 .to_owned(),
         ),
         Place::Base(_) => (
@@ -261,16 +260,14 @@ fn finding(
             (
                 format!("the zero position of joint {} is off by {by}", joint + 1),
                 "if the joint lost its zero position there (a slipped belt, a new reference \
-                 run), fit the \
-                 rows before and after by themselves"
+                 run), fit the rows before and after by themselves"
                     .to_owned(),
             )
         }
         Place::Arm => (
             "the arm is another one".to_owned(),
             "the rows before and after fit by themselves, but not together: check whether they \
-             are of one \
-             arm with one set-up, and fit them by themselves"
+             are of one arm with one set-up, and fit them by themselves"
                 .to_owned(),
         ),
     };
@@ -278,8 +275,7 @@ fn finding(
     let after = (step.cost / freedom_of(linear, step)).sqrt();
     let text = format!(
         "from {location} on ({} of {} rows) {what}: this change would leave, as linearised, a \
-         residual of \
-         {after:.1} times the declared σ instead of {before:.1}",
+         residual of {after:.1} times the declared σ instead of {before:.1}",
         order.len() - step.first,
         order.len()
     );

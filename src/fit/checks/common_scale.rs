@@ -40,10 +40,8 @@ impl Check for ScaleHolds {
         let sigmas = score.abs();
         let text = format!(
             "a common factor of {:.4} explains the fitted lengths of the arm ({lengths} lengths, \
-             of which the \
-             measurements determine about {determined:.0}): they are {:.2} % {side} than \
-             declared, {sigmas:.1} σ beyond what \
-             their priors allow",
+             of which the measurements determine about {determined:.0}): they are {:.2} % {side} \
+             than declared, {sigmas:.1} σ beyond what their priors allow",
             1.0 + error,
             100.0 * error.abs()
         );
@@ -63,8 +61,7 @@ fn remedy(fit: &CheckedFit, factor: f64) -> String {
         let print = print.map_or_else(String::new, |spacing| {
             format!(
                 " (measure the print: points 0 and 1 are declared {:.3} mm apart, the declared \
-                 lengths of the arm \
-                 say {:.3} mm)",
+                 lengths of the arm say {:.3} mm)",
                 spacing * 1e3,
                 spacing * 1e3 / factor
             )
@@ -149,10 +146,11 @@ impl CommonFactor {
         let (deviations, nominal) =
             (of_length(&|k| fit.end.x[k]), of_length(&|k| parameters[k].nominal));
         // I − Σ^(-1/2) C Σ^(-1/2): share of each whitened length that the data determine.
-        let determined = DMatrix::from_fn(n, n, |row, column| {
+        let posterior = DMatrix::from_fn(n, n, |row, column| {
             let covariance = fit.covariance[(lengths[row].0, lengths[column].0)];
-            f64::from(u8::from(row == column)) - covariance / (sigma[row] * sigma[column])
+            covariance / (sigma[row] * sigma[column])
         });
+        let determined = DMatrix::identity(n, n) - posterior;
         let score_of = |nominal: &DVector<f64>| {
             let information = nominal.dot(&(&determined * nominal));
             (nominal.dot(&deviations) / information, information)

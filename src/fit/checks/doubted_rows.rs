@@ -223,7 +223,7 @@ fn other_session(
         let others = (0..placement.bases.len()).filter(|base| *base != pose.base);
         let moved: Vec<Pose> = others
             .map(|base| {
-                // Sessions without a column target have a target of their own.
+                // Without a column target each session has its target.
                 let has_target =
                     placement.targets.get(pose.target) == placement.bases.get(pose.base);
                 let target = placement.bases.get(base).filter(|_| has_target);

@@ -251,8 +251,7 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             }
             FindingCode::HeldOutOutliers if is_beyond_noise => {
                 "the fitted rows are off too: look first for what the model lacks with flexcal \
-                 loop, \
-                 then at these rows"
+                 loop, then at these rows"
             }
             _ => continue,
         };

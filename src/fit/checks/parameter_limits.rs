@@ -133,8 +133,7 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
         let unit = unit.map_or(String::new(), |(_, unit)| format!(", as one in {unit} would be"));
         return Some(format!(
             "the fitted stiffness is {ratio:.3} times the declared one{unit}; check its unit, \
-             those of masses and \
-             payload_at, then the prior"
+             those of masses and payload_at, then the prior"
         ));
     }
     if let ParameterSite::Base { base, .. } = parameter.site {
@@ -199,8 +198,7 @@ fn euler_remedy(fit: &CheckedFit, base: usize) -> Option<String> {
     (is_read && is_other).then(|| {
         format!(
             "rotation_deg of [base] is a rotation vector; [{}] fits as Euler angles (roll, \
-             pitch, yaw), which are \
-             rotation_deg = [{}]",
+             pitch, yaw), which are rotation_deg = [{}]",
             shown(declared),
             shown(vector)
         )

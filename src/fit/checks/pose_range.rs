@@ -83,8 +83,7 @@ impl Check for PosesSpread {
         let verb = if still.len() == 1 { "stays" } else { "stay" };
         let text = format!(
             "{} {verb}{place} in all fitted rows, so that the fit says little about predictions \
-             with other \
-             values",
+             with other values",
             names.join(", ")
         );
         vec![Finding::new(FindingCode::NarrowPoses, [json!(names), false.into()], text)]
