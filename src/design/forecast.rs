@@ -1,11 +1,11 @@
 //! Forecast of the errors of identification from given poses.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::Sensitivity;
 use crate::least_squares::{Identifiability, Uncertainty};
 use crate::model::parameter::{Parameter, ParameterSite};
+use crate::numeric::parallel;
 use crate::quantity::Unit;
 
 /// Part of a parameter, 0 to 1, that lies in undetermined combinations, from which on the forecast
@@ -117,10 +117,8 @@ impl Forecast {
         if arms.is_empty() {
             return self;
         }
-        let variances: Vec<Vec<f64>> = arms
-            .par_iter()
-            .map(|arm| Posterior::of(&arm.triangle(), parameters).variances)
-            .collect();
+        let variances =
+            parallel::map_items(arms, |arm| Posterior::of(&arm.triangle(), parameters).variances);
         for (k, (expected, parameter)) in self.expected.iter_mut().zip(parameters).enumerate() {
             if expected.std_error.is_some() {
                 let mean =

@@ -1,11 +1,9 @@
 //! Choice of poses one after the other, each where it lowers the mean variance of predictions most.
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, SMatrix};
-use rayon::prelude::*;
 
 use super::views::COMPRESSED_ROWS;
+use crate::numeric::parallel;
 use crate::numeric::product;
 
 /// Number of candidates that one thread evaluates at a time.
@@ -52,20 +50,16 @@ impl<'a> Greedy<'a> {
     /// Returns the decrease of the goal tr(C M) by each candidate.
     pub fn gains(&self) -> Vec<f64> {
         let count = self.candidates.ncols() / self.coordinates;
-        let blocks: Vec<Range<usize>> = (0..count)
-            .step_by(BLOCK_CANDIDATES)
-            .map(|start| start..(start + BLOCK_CANDIDATES).min(count))
-            .collect();
-        blocks
-            .into_par_iter()
-            .flat_map_iter(|block| {
-                block.map(|k| match self.coordinates {
-                    6 => self.gain::<6>(k),
-                    COMPRESSED_ROWS => self.gain::<COMPRESSED_ROWS>(k),
-                    _ => self.gain::<3>(k),
-                })
-            })
-            .collect()
+        let of_block = |block: usize| -> Vec<f64> {
+            let start = block * BLOCK_CANDIDATES;
+            let gain = |k| match self.coordinates {
+                6 => self.gain::<6>(k),
+                COMPRESSED_ROWS => self.gain::<COMPRESSED_ROWS>(k),
+                _ => self.gain::<3>(k),
+            };
+            (start..(start + BLOCK_CANDIDATES).min(count)).map(gain).collect()
+        };
+        parallel::joined(parallel::map(count.div_ceil(BLOCK_CANDIDATES), of_block))
     }
 
     /// Returns the decrease of the goal by one candidate with R coordinates.

@@ -1,9 +1,8 @@
 //! Benefit of additional poses of the same kind.
 
-use rayon::prelude::*;
-
 use super::{Forecast, Prediction, Sensitivity};
 use crate::model::parameter::Parameter;
+use crate::numeric::parallel;
 
 /// Numbers of poses at which the series is evaluated.
 const POSE_COUNTS: [usize; 14] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384];
@@ -67,7 +66,7 @@ impl Growth {
         counts.extend([extra.min(series.len()), series.len()]);
         counts.sort_unstable();
         counts.dedup();
-        let steps: Vec<GrowthStep> = counts.into_par_iter().map(step).collect();
+        let steps = parallel::map(counts.len(), |k| step(counts[k]));
         let (attainable_rank, undetermined) = match elsewhere {
             Some(elsewhere) => {
                 let forecast = Forecast::new(parameters, &series.and(elsewhere));

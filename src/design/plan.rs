@@ -17,6 +17,7 @@ use super::{
 use crate::measurement::Measurements;
 use crate::model::parameter::Parameter;
 use crate::numeric::median;
+use crate::numeric::parallel;
 use crate::problem::{PoseRanges, Problem};
 use crate::random;
 
@@ -214,7 +215,7 @@ pub fn plan(
         let of_points = site.all_points(&table.select(&rows));
         forecast(&of_points.unwrap_or_else(|| uniform.select(&rows)))
     };
-    let random = (0..RANDOM_SETS).into_par_iter().map(random_set).collect();
+    let random = parallel::map(RANDOM_SETS, random_set);
     let undetermined_now = |forecast: &Forecast| {
         forecast
             .undetermined

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, SMatrix, SVector};
-use rayon::prelude::*;
 
 use super::criterion::{Measure, ScaledCriterion, block};
 use super::views::COMPRESSED_ROWS;
 use crate::numeric::bisect;
+use crate::numeric::parallel;
 
 /// Number of candidates whose products are computed in one matrix product.
 const BLOCK_CANDIDATES: usize = 256;
@@ -98,18 +98,11 @@ impl<'a> CandidateScan<'a> {
         Square<R>: Small,
     {
         let count = candidates.ncols() / R;
-        let starts: Vec<usize> = (0..count).step_by(BLOCK_CANDIDATES).collect();
-        let best: Vec<_> = starts
-            .into_par_iter()
-            .map(|start| {
-                self.best_of::<R>(
-                    candidates,
-                    start..(start + BLOCK_CANDIDATES).min(count),
-                    &is_allowed,
-                    limit,
-                )
-            })
-            .collect();
+        let best = parallel::map(count.div_ceil(BLOCK_CANDIDATES), |block| {
+            let start = block * BLOCK_CANDIDATES;
+            let range = start..(start + BLOCK_CANDIDATES).min(count);
+            self.best_of::<R>(candidates, range, &is_allowed, limit)
+        });
         best.into_iter().flatten().reduce(|best, next| if next.1 < best.1 { next } else { best })
     }
 

@@ -1,10 +1,10 @@
 //! Sensitivity of the measurements of each pose to each parameter.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
-use rayon::prelude::*;
 
 use crate::least_squares::{Block, LeastSquares as _, Triangle};
 use crate::model::{Model, Pose, PoseResiduals};
+use crate::numeric::parallel;
 
 /// Number of poses that are differentiated together.
 const BLOCK_POSES: usize = 64;
@@ -28,16 +28,13 @@ impl Sensitivity {
         let n = model.parameters.len();
         let residuals = PoseResiduals::new(model, poses.to_vec(), (0..n).collect(), at.clone());
         let coordinates = residuals.rows_per_item();
-        let starts: Vec<usize> = (0..poses.len()).step_by(BLOCK_POSES).collect();
-        let blocks: Vec<(usize, Block)> = starts
-            .into_par_iter()
-            .map(|start| {
-                let items = start..(start + BLOCK_POSES).min(poses.len());
-                let mut block = Block::zeros(coordinates * items.len(), n);
-                residuals.linearise(at, items, &mut block);
-                (start, block)
-            })
-            .collect();
+        let blocks = parallel::map(poses.len().div_ceil(BLOCK_POSES), |block| {
+            let start = block * BLOCK_POSES;
+            let items = start..(start + BLOCK_POSES).min(poses.len());
+            let mut block = Block::zeros(coordinates * items.len(), n);
+            residuals.linearise(at, items, &mut block);
+            (start, block)
+        });
         let mut rows = DMatrix::zeros(n, coordinates * poses.len());
         for (start, block) in blocks {
             for j in 0..n {

@@ -4,10 +4,10 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
-use rayon::prelude::*;
 
 use super::{Block, LeastSquares, Linearisation, Triangle};
 use crate::numeric::kernel::sum_of_squares;
+use crate::numeric::parallel;
 use crate::numeric::{gram, inverse_factor};
 
 /// Largest ‖ρ‖ / ‖J₀ δ‖ at which the derivatives J₀ of the base point are reused after a step δ,
@@ -140,7 +140,7 @@ impl BasePoint {
                 gradient: columns.tr_mul(&error),
             }
         };
-        let errors: Vec<ChunkError> = self.chunks.par_iter().map(error).collect();
+        let errors = parallel::map_items(&self.chunks, error);
         let mut gradient = DVector::zeros(n);
         let mut sums = [0.0; 3];
         for chunk in errors {

@@ -4,7 +4,6 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::chord::{BasePoint, Chunk};
 use super::curvature::curvature_by_differences;
@@ -14,6 +13,7 @@ use super::{
     Objective, RowsError, Triangle, slopes,
 };
 use crate::numeric::kernel::{dot, sum_of_squares};
+use crate::numeric::parallel;
 
 /// Number of items (poses) that are reduced to one triangular factor at a time. Larger problems
 /// keep only n × n factors, never the m × n matrix.
@@ -215,7 +215,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
             self.linearise_chunk(x, index, &mut block);
             Chunk { items: self.items_of_chunk(index), block }
         };
-        let chunks: Vec<Chunk> = (0..self.chunk_count()).into_par_iter().map(chunk).collect();
+        let chunks = parallel::map(self.chunk_count(), chunk);
         let triangle =
             self.reduce_by(&|index, block: &mut Block| block.clone_from(&chunks[index].block));
         BasePoint::new(x, key, chunks, triangle)
@@ -257,10 +257,10 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
 
 /// Applies `map` to the index of each of `count` chunks and a `buffer`, in parallel if there are
 /// several chunks. Passes the results to `take` in the order of the chunks.
-fn map_in_order<B, T: Send>(
+fn map_in_order<B: Send, T: Send>(
     count: usize,
-    buffer: impl Fn() -> B + Sync + Send,
-    map: impl Fn(usize, &mut B) -> T + Sync + Send,
+    buffer: impl Fn() -> B + Sync,
+    map: impl Fn(usize, &mut B) -> T + Sync,
     mut take: impl FnMut(T),
 ) {
     if count <= 1 {
@@ -268,10 +268,9 @@ fn map_in_order<B, T: Send>(
         return;
     }
     for group in (0..count).step_by(MAX_CHUNKS_IN_MEMORY) {
-        let results: Vec<T> = (group..(group + MAX_CHUNKS_IN_MEMORY).min(count))
-            .into_par_iter()
-            .map_init(&buffer, |buffer, index| map(index, buffer))
-            .collect();
+        let chunks = MAX_CHUNKS_IN_MEMORY.min(count - group);
+        let results =
+            parallel::map_with(chunks, &buffer, |chunk, buffer| map(group + chunk, buffer));
         results.into_iter().for_each(&mut take);
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{Block, CHUNK_ITEMS, LeastSquares};
+use crate::numeric::parallel;
 use crate::numeric::zeros;
 
 /// Returns all residuals r(x) in one vector.
@@ -14,8 +15,7 @@ pub fn residual_vector<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DVecto
         problem.residuals(x, 0..items, residuals.as_mut_slice());
         return residuals;
     }
-    let chunks = residuals.as_mut_slice().par_chunks_mut((CHUNK_ITEMS * rows).max(1)).enumerate();
-    chunks.for_each(|(chunk, out)| {
+    parallel::write_chunks(residuals.as_mut_slice(), (CHUNK_ITEMS * rows).max(1), &|chunk, out| {
         let first = chunk * CHUNK_ITEMS;
         problem.residuals(x, first..items.min(first + CHUNK_ITEMS), out);
     });

@@ -4,7 +4,6 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DVector, Vector3};
-use rayon::prelude::*;
 
 use super::Model;
 use super::jacobian::JacobianWriter;
@@ -13,6 +12,7 @@ use super::load_moments::JacobianColumns;
 use super::pose::Pose;
 use super::predictor::{Prediction, Predictor};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
+use crate::numeric::parallel;
 use crate::observation::Needs;
 
 /// Number of residuals of a row if no row has an orientation.
@@ -117,7 +117,7 @@ impl<'a> PoseResiduals<'a> {
         if self.poses.len() <= CHUNK_ITEMS {
             return chunk(&self.poses);
         }
-        self.poses.par_chunks(CHUNK_ITEMS).flat_map_iter(chunk).collect()
+        parallel::map_chunks(&self.poses, CHUNK_ITEMS, chunk)
     }
 }
 

@@ -1,7 +1,6 @@
 //! Predicted rows, positions, orientations and shapes at a full parameter vector.
 
 use nalgebra::{DVector, Vector3};
-use rayon::prelude::*;
 
 use super::Model;
 use super::pose::Pose;
@@ -9,6 +8,7 @@ use super::pose_residuals::PoseResiduals;
 use super::predictor::Predictor;
 use crate::least_squares::CHUNK_ITEMS;
 use crate::mechanics::CentreLine;
+use crate::numeric::parallel;
 use crate::observation::{FixtureValues, Needs, Observation};
 use crate::spatial::{Frame, rotation_between};
 
@@ -172,6 +172,6 @@ impl Model {
             let mut predictor = Predictor::new(self, x);
             poses.iter().map(|pose| value(&mut predictor, pose)).collect::<Vec<_>>()
         };
-        poses.par_chunks(CHUNK_ITEMS).flat_map_iter(chunk).collect()
+        parallel::map_chunks(poses, CHUNK_ITEMS, chunk)
     }
 }

@@ -3,6 +3,7 @@
 mod bootstrap;
 mod factor;
 pub(crate) mod kernel;
+pub(crate) mod parallel;
 mod product;
 
 pub use bootstrap::Interval;

@@ -1,10 +1,10 @@
 //! Parallel products of tall matrices. How the work is divided depends only on the sizes, so
 //! results are the same to the bit for any number of threads.
 
+use super::parallel;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, MatrixView};
-use rayon::prelude::*;
 
 /// Number of result columns that one thread computes at a time. Smaller blocks are slower, because
 /// the matrix product repacks the left factor for each block.
@@ -112,7 +112,7 @@ fn product_to(
         return a.mul_to(b, &mut out.rows_mut(0, rows));
     }
     let height = out.nrows();
-    let form = |(part, entries): (usize, &mut [f64])| {
+    let form = |part: usize, entries: &mut [f64]| {
         let (first, count) = (part * BLOCK_COLUMNS, entries.len() / height);
         let filled = filled(first..first + count);
         let mut block = DMatrixViewMut::from_slice(entries, height, count);
@@ -124,7 +124,7 @@ fn product_to(
         );
     };
     // The last columns of an upper triangle are the longest, so they are computed first.
-    out.as_mut_slice().par_chunks_mut(height * BLOCK_COLUMNS).enumerate().rev().for_each(form);
+    parallel::write_chunks_from_last(out.as_mut_slice(), height * BLOCK_COLUMNS, &form);
 }
 
 /// Returns L B for a square lower triangle L, on one thread.
@@ -148,8 +148,7 @@ fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = a.nrows();
     let of_rows =
         |part: usize| a.rows(part * BLOCK_ROWS, BLOCK_ROWS.min(rows - part * BLOCK_ROWS)) * b;
-    let parts: Vec<DMatrix<f64>> =
-        (0..rows.div_ceil(BLOCK_ROWS)).into_par_iter().map(of_rows).collect();
+    let parts = parallel::map(rows.div_ceil(BLOCK_ROWS), of_rows);
     let mut out = zeros(rows, b.ncols());
     for (index, part) in parts.iter().enumerate() {
         out.rows_mut(index * BLOCK_ROWS, part.nrows()).copy_from(part);
@@ -167,7 +166,7 @@ pub(crate) fn transposed_narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> D
     // BᵀA is formed instead of AᵀB: transposing the narrow side is faster.
     let transposed = transposed_view(b);
     let mut out = zeros(b.ncols(), n);
-    let form = |(part, entries): (usize, &mut [f64])| {
+    let form = |part: usize, entries: &mut [f64]| {
         let (first, count) = (part * width, entries.len() / transposed.nrows());
         let mut block = DMatrixViewMut::from_slice(entries, transposed.nrows(), count);
         let a = a.columns(first, count);
@@ -179,7 +178,7 @@ pub(crate) fn transposed_narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> D
             block.gemm(1.0, &transposed, &a, 0.0);
         }
     };
-    out.as_mut_slice().par_chunks_mut(b.ncols() * width).enumerate().for_each(form);
+    parallel::write_chunks(out.as_mut_slice(), b.ncols() * width, &form);
     out.transpose()
 }
 
@@ -191,7 +190,7 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     }
     let transposed = transposed_view(a);
     let mut out = zeros(n, n);
-    let form = |(part, entries): (usize, &mut [f64])| {
+    let form = |part: usize, entries: &mut [f64]| {
         let (first, count) = (part * BLOCK_COLUMNS, entries.len() / n);
         let mut block = DMatrixViewMut::from_slice(entries, n, count);
         let end = first + count;
@@ -207,7 +206,7 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
         }
     };
     // The last columns of the upper triangle are the longest, so they are computed first.
-    out.as_mut_slice().par_chunks_mut(n * BLOCK_COLUMNS).enumerate().rev().for_each(form);
+    parallel::write_chunks_from_last(out.as_mut_slice(), n * BLOCK_COLUMNS, &form);
     out.fill_lower_triangle_with_upper_triangle();
     out
 }
@@ -221,7 +220,7 @@ pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     }
     let transposed = transposed_view(lower);
     let mut out = zeros(n, n);
-    let form = |(part, entries): (usize, &mut [f64])| {
+    let form = |part: usize, entries: &mut [f64]| {
         let (first, count) = (part * BLOCK_COLUMNS, entries.len() / n);
         let mut block = DMatrixViewMut::from_slice(entries, n, count);
         // Columns from `first` on have zeros above that row.
@@ -239,7 +238,7 @@ pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
             block.rows_mut(0, end).gemm(1.0, &left, &right, 0.0);
         }
     };
-    out.as_mut_slice().par_chunks_mut(n * BLOCK_COLUMNS).enumerate().for_each(form);
+    parallel::write_chunks(out.as_mut_slice(), n * BLOCK_COLUMNS, &form);
     out.fill_lower_triangle_with_upper_triangle();
     out
 }
@@ -266,7 +265,7 @@ pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatr
         let (first, end) = (part * n / parts, (part + 1) * n / parts);
         transposed.rows(first, end - first) * b
     };
-    let blocks: Vec<DMatrix<f64>> = (0..parts).into_par_iter().map(of_columns).collect();
+    let blocks = parallel::map(parts, of_columns);
     let mut out = zeros(n, b.ncols());
     for (part, block) in blocks.iter().enumerate() {
         out.rows_mut(part * n / parts, block.nrows()).copy_from(block);

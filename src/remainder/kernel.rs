@@ -2,9 +2,9 @@
 //! arm's Jacobian maps these to the measured position.
 
 use nalgebra::{DMatrix, Matrix3};
-use rayon::prelude::*;
 
 use super::rows::{AXES, Inputs, Rows};
+use crate::numeric::parallel;
 
 /// Hyperparameters of the remainder.
 ///
@@ -169,7 +169,7 @@ pub(super) fn covariance(
         let n = of.nrows();
         n * row..n * (row + 1)
     };
-    let columns = |(pose, out): (usize, &mut [f64])| {
+    let columns = |pose: usize, out: &mut [f64]| {
         let mut sites = vec![0.0; hyper.sites()];
         let mut squares = vec![0.0; inputs.angles.len()];
         let second = &of_right.as_slice()[of_row(&of_right, pose)];
@@ -185,7 +185,7 @@ pub(super) fn covariance(
             });
         }
     };
-    out.as_mut_slice().par_chunks_mut(AXES * height).enumerate().for_each(columns);
+    parallel::write_chunks(out.as_mut_slice(), AXES * height, &columns);
     out
 }
 

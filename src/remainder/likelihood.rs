@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::kernel::{Hyperparameters, embedded, matern, position_covariances, squared_distances};
 use super::prior::ParameterPrior;
 use super::rows::{AXES, InputSource, Inputs, Rows, SiteFunctions};
+use crate::numeric::parallel;
 use crate::numeric::{
     gram, gram_of_lower, inverse_lower, lower_factor, product_with_lower, product_with_upper,
 };
@@ -104,7 +105,7 @@ impl<'a> MarginalLikelihood<'a> {
             let pairs = first..rows.len();
             pairs.flat_map(|second| squared_distances(of_row(first), of_row(second))).collect()
         };
-        let distances = (0..rows.len()).into_par_iter().map(behind).collect();
+        let distances = parallel::map(rows.len(), behind);
         let (size, scaled_transposed) = (size.ln(), scaled.transpose());
         Some(Self {
             rows,
@@ -373,7 +374,7 @@ impl<'a> MarginalLikelihood<'a> {
             }
             out
         };
-        let columns: Vec<Vec<f64>> = (0..n).into_par_iter().map(column).collect();
+        let columns: Vec<Vec<f64>> = parallel::map(n, column);
         let mut sums = vec![0.0; 4 * sites + width];
         for column in columns {
             column.iter().zip(&mut sums).for_each(|(value, sum)| *sum += value);

@@ -10,6 +10,7 @@ use super::inducing::Inducing;
 use super::kernel::{Hyperparameters, covariance, variance};
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Rows, coordinates};
+use crate::numeric::parallel;
 use crate::numeric::{gram, inverse_lower, lower_factor, product, product_with_upper};
 
 /// Fraction of its variance that is added to each inducing variable, so that the covariance remains
@@ -70,12 +71,15 @@ pub(super) struct RowFactors {
 impl RowFactors {
     /// Returns the posterior of each row.
     pub fn rows(&self) -> Vec<RowPosterior> {
-        let of_row = |(row, &(prior, left)): (usize, &(f64, Matrix3<f64>))| RowPosterior {
-            mean: Vector3::from_fn(|axis, _| self.mean[AXES * row + axis]),
-            covariance: left + outer_block(&self.spread, row, self.spread.ncols()),
-            prior,
+        let of_row = |row: usize| {
+            let (prior, left) = self.priors[row];
+            RowPosterior {
+                mean: Vector3::from_fn(|axis, _| self.mean[AXES * row + axis]),
+                covariance: left + outer_block(&self.spread, row, self.spread.ncols()),
+                prior,
+            }
         };
-        self.priors.par_iter().enumerate().map(of_row).collect()
+        parallel::map(self.priors.len(), of_row)
     }
 }
 
@@ -195,7 +199,7 @@ impl Posterior {
         RowFactors {
             mean: &features * &self.weights + &rows.jacobian * &self.prior.mean,
             spread: product_with_upper(&features, &self.inverse_factor.transpose()),
-            priors: (0..rows.len()).into_par_iter().map(of_row).collect(),
+            priors: parallel::map(rows.len(), of_row),
         }
     }
 

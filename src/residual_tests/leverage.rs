@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
-use rayon::prelude::*;
 
 use super::fit_residual::FitResidual;
 use super::outcome::Untestable;
+use crate::numeric::parallel;
 use crate::numeric::{gram, lower_factor, multiply_by_upper};
 
 /// Minimum number of residual degrees of freedom for any test.
@@ -112,8 +112,7 @@ fn by_poses<T: Send>(
         let first = part * together;
         of(first, &fitted.rows(3 * first, 3 * together.min(poses - first)).transpose())
     };
-    let parts: Vec<Vec<T>> = (0..poses.div_ceil(together)).into_par_iter().map(part).collect();
-    parts.into_iter().flatten().collect()
+    parallel::joined(parallel::map(poses.div_ceil(together), part))
 }
 
 /// Returns A_bᵀ B_b, where A_b and B_b are the three columns that belong to pose b.

@@ -10,6 +10,7 @@ use statrs::distribution::{ContinuousCDF as _, Normal};
 use super::chance::{Chance, Drawn};
 use super::leverage::Leverage;
 use super::statistic::{Sample, Statistic};
+use crate::numeric::parallel;
 use crate::numeric::{subtract_product, transposed_product};
 
 /// Largest and smallest number of permutation draws. Fewer than the largest are made if their
@@ -65,7 +66,7 @@ pub(super) fn null_distributions(
         evaluate_draws(leverage, statistics, space)
     };
     let drawn: Vec<Vec<Vec<f64>>> = if together > MIN_BATCH_DRAWS {
-        starts.into_par_iter().map_init(DMatrix::default, values).collect()
+        parallel::map_with(starts.len(), DMatrix::default, |k, space| values(space, starts[k]))
     } else {
         // If draws take much memory, all threads work on the same few draws.
         let mut space = DMatrix::default();

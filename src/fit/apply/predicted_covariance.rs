@@ -2,7 +2,6 @@
 //! from the covariance of the estimates.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use rayon::prelude::*;
 
 use crate::fit::IdentifyError;
 use crate::fit::apply::predict_saved::PredictError;
@@ -12,6 +11,7 @@ use crate::fit::stages::placement::Placement;
 use crate::least_squares::{Block, LeastSquares as _};
 use crate::measurement::Measurements;
 use crate::model::{Model, Pose, PoseResiduals};
+use crate::numeric::parallel;
 use crate::problem::Problem;
 
 /// Predicted position of a row with its uncertainty.
@@ -123,5 +123,5 @@ pub fn standard_errors(
         let spread = &jacobian * &covariance * jacobian.transpose();
         Vector3::from_fn(|i, _| spread[(i, i)].sqrt())
     };
-    Ok((0..rows.len()).into_par_iter().map(of_row).collect())
+    Ok(parallel::map(rows.len(), of_row))
 }

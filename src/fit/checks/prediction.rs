@@ -2,7 +2,6 @@
 //! larger than those of the nominal arm?
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
 use super::checked_fit::{Check, CheckedFit};
@@ -11,6 +10,7 @@ use super::row_kind::{format_error, row_noun};
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::noise::Noise;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
+use crate::numeric::parallel;
 
 /// p-value of the held-out residuals below which they contradict the prediction.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
@@ -110,8 +110,7 @@ fn predictive_chi2(
         });
         scaled.tr_mul(&scaled)
     };
-    let chunks: Vec<DMatrix<f64>> =
-        (0..rows.len().div_ceil(CHUNK_ITEMS)).into_par_iter().map(of_chunk).collect();
+    let chunks = parallel::map(rows.len().div_ceil(CHUNK_ITEMS), of_chunk);
     let products = chunks.into_iter().reduce(|a, b| a + b)?;
     let correlation = DMatrix::from_fn(n, n, |i, j| match scale[i] * scale[j] {
         unit if unit > 0.0 => covariance[(i, j)] / unit,

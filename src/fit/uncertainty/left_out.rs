@@ -1,10 +1,10 @@
 //! Cross-validation: errors of configurations that are left out of the fit one at a time.
 
 use nalgebra::{DMatrix, DVector, Vector3};
-use rayon::prelude::*;
 
 use crate::fit::stages::fitting::Fitting;
 use crate::least_squares::jacobian_and_residual;
+use crate::numeric::parallel;
 
 /// Ridge on the diagonal of the normal matrix, as a fraction of the entry there. Combinations that
 /// only one configuration determines then keep their fitted values if that one is left out.
@@ -76,7 +76,7 @@ impl Fitting<'_> {
             places.iter().enumerate().map(error).collect()
         };
         let mut errors = vec![Vector3::zeros(); rows.len()];
-        let errors_of_places: Vec<_> = groups.par_iter().flat_map_iter(of_group).collect();
+        let errors_of_places = parallel::joined(parallel::map_items(&groups, of_group));
         for (place, error) in errors_of_places {
             errors[place] = error;
         }

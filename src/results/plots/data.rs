@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use super::arm::{Arm, Poses};
 use super::cause::{self, Cause, EffectFit};
@@ -17,11 +16,12 @@ use crate::fit::{
 };
 use crate::measurement::Dataset;
 use crate::model::{CentreLine, Pose};
+use crate::numeric::parallel;
 use crate::problem::Problem;
 use crate::remainder::Fitted;
 use crate::residual_tests::ResidualTests;
 use crate::results::tables::{CommandedJoint, commanded_joints};
-use crate::select::{ClosedLoop, Found, examine};
+use crate::select::{ClosedLoop, examine};
 
 /// Maximum number of poses that a report page contains individually.
 const MAX_SHOWN_POSES: usize = 600;
@@ -168,12 +168,11 @@ impl PlotData {
         };
         let levers = poses.levers(&after, &coordinates);
         let fit = EffectFit { arm: &after, residuals: &residuals, levers: &levers };
-        let cause = |(k, found): (usize, &Found)| {
-            let cause = cause::of(&found.effect, &closure.closed, fit, &poses)?;
+        let cause = |k: usize| {
+            let cause = cause::of(&closure.effects[k].effect, &closure.closed, fit, &poses)?;
             Some(Cause { found: Some(k), ..cause })
         };
-        let causes: Vec<Option<Cause>> =
-            closure.effects.par_iter().enumerate().map(cause).collect();
+        let causes = parallel::map(closure.effects.len(), cause);
         Ok(Self {
             causes: causes.into_iter().flatten().collect(),
             trend: closure

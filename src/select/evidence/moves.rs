@@ -3,13 +3,12 @@
 
 use std::collections::BTreeSet;
 
-use rayon::prelude::*;
-
 use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION};
 use super::hypotheses::Hypotheses;
 use super::products::Products;
 use super::search::{EvaluatedSet, reduced_by};
 use super::waves::is_free;
+use crate::numeric::parallel;
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
@@ -79,8 +78,7 @@ pub(super) fn promising(
             .map(|(k, candidate)| (candidate, odds.iter().map(|of| of[k]).collect()))
             .collect()
     };
-    let moves_with_odds: Vec<(Candidate, Vec<f64>)> =
-        new.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(ln_odds_of).collect();
+    let moves_with_odds = parallel::map_chunks(&new, HYPOTHESES_PER_PROJECTION, ln_odds_of);
     let mut found: Vec<Candidate> = Vec::new();
     for k in 0..reduced_problems.len() {
         let best = moves_with_odds

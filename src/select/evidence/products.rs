@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::block::Block;
 use super::cache::Cache;
 use super::column_products::{ColumnProducts, MIN_SIDE, Member, form_products};
 use super::marginal::{Noise, NoiseGrid, Normal};
 use crate::fit::Stop;
+use crate::numeric::parallel;
 use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
 use crate::select::neighbourhood::LinearNeighbourhood;
 
@@ -328,8 +328,7 @@ impl ReducedProblem<'_, '_> {
         let of = |some: &[usize]| {
             if stop.is_requested() { Vec::new() } else { self.gains_together(some) }
         };
-        let gains: Vec<(f64, f64)> =
-            tried.par_chunks(HYPOTHESES_PER_PRODUCT).flat_map_iter(of).collect();
+        let gains = parallel::map_chunks(tried, HYPOTHESES_PER_PRODUCT, of);
         if gains.len() == tried.len() { gains } else { Vec::new() }
     }
 

@@ -16,6 +16,7 @@
 //! other function can describe such a short wave, so it is searched for in addition to every
 //! probable set.
 
+use crate::numeric::parallel;
 use crate::select::settings::{
     LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_REVISED_SETS, MAX_WAVE_ORDER, MIN_REVISED_PROBABILITY,
 };
@@ -23,7 +24,6 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION, joint_and_order};
 use super::functions::expand;
@@ -284,11 +284,10 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let blocks = Candidate::blocks(&waves, fit, self.left_out);
             let of_sets: Vec<Vec<f64>> =
                 reduced_problems.iter().map(|left| left.ln_odds_of(&blocks)).collect();
-            let odds = |k: usize| of_sets.iter().map(|odds| odds[k]).collect();
+            let odds = |k: usize| of_sets.iter().map(|odds| odds[k]).collect::<Vec<f64>>();
             orders.into_iter().enumerate().map(|(k, order)| (order, odds(k))).collect()
         };
-        let odds_of_orders: Vec<(f64, Vec<f64>)> =
-            orders.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(of).collect();
+        let odds_of_orders = parallel::map_chunks(orders, HYPOTHESES_PER_PROJECTION, of);
         let of_set = |k: usize| {
             let mut of_orders: Vec<(f64, f64)> =
                 odds_of_orders.iter().map(|(order, odds)| (*order, odds[k])).collect();

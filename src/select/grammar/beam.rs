@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::quantities::Quantities;
 use super::refinement::Refiner;
 use super::site::{BEAM_VARIANCE, Noise, Span, Weighted, WhitenedSite};
 use super::terms::{Chunk, Product, Sum, Terms, is_separated, ln_prior};
 use crate::numeric::kernel::few_transposed_times;
+use crate::numeric::parallel;
 
 /// Maximum number of terms of a sum.
 const MAX_TERMS: usize = 3;
@@ -179,7 +179,8 @@ impl<'a> Beam<'a> {
         }
         // A sum that does not explain more than the best term alone is not worth its second term.
         let least = along.iter().fold(0.0_f64, |most, along| most.max(along * along));
-        let of_chunk = |(number, chunk): (usize, &&Chunk)| {
+        let of_chunk = |number: usize| {
+            let chunk = chunks[number];
             let products = &weighted * &chunk.columns;
             let mut sums: Vec<Extension> = Vec::new();
             for term in 0..chunk.terms.len() {
@@ -204,7 +205,7 @@ impl<'a> Beam<'a> {
             }
             best_of(sums)
         };
-        let sums: Vec<Extension> = chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
+        let sums = parallel::joined(parallel::map(chunks.len(), of_chunk));
         for Extension { indices: (k, chunk, term), scored } in best_of(sums) {
             let (_, first_chunk, first_term) = first[k].indices;
             let mut sum = vec![
@@ -307,7 +308,8 @@ impl<'a> Beam<'a> {
         let ln_prior_of_count =
             if spanned.sum.is_empty() { 0.0 } else { 0.5_f64.ln() + (count + 1.0).ln() };
         let (before, rank) = (spanned.span.explained_squares(), spanned.span.along.len());
-        let of_chunk = |(number, chunk): (usize, &Chunk)| {
+        let of_chunk = |number: usize| {
+            let chunk = &chunks[number];
             let along = few_transposed_times(&spanned.weighted, &chunk.columns);
             let product = |a: usize, b: usize| {
                 let pairs = along.column(a).into_iter().zip(along.column(b));
@@ -329,9 +331,7 @@ impl<'a> Beam<'a> {
             }
             best_of(extensions)
         };
-        let extensions: Vec<Extension> =
-            chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
-        best_of(extensions)
+        best_of(parallel::joined(parallel::map(chunks.len(), of_chunk)))
     }
 
     /// Returns the scores of a sum that explains the sum of squares `explained` with `rank`

@@ -1,12 +1,12 @@
 //! Terms: products of up to three factors, with their columns and inner products.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::factor::{Factor, Form};
 use super::quantities::Quantities;
 use super::site::{Span, WhitenedSite};
 use crate::numeric::kernel::{dot, few_transposed_times, sum_of_squares};
+use crate::numeric::parallel;
 
 /// Prior probability that a term has one, two or three factors.
 const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
@@ -148,7 +148,8 @@ impl Terms {
     /// A term that alone explains little may explain most of what other terms leave.
     pub fn beside(&self, spans: &[Span], site: &WhitenedSite) -> Vec<Vec<Product>> {
         let n = site.diagonal.len();
-        let gains = |(number, chunk): (usize, &Chunk)| {
+        let gains = |number: usize| {
+            let chunk = &self.pairs[number];
             let terms: Vec<&Product> = chunk.terms.iter().collect();
             let columns = self.unit_columns(chunk.width, &terms, n);
             let of_span = |Span { weighted, along, .. }: &Span| {
@@ -158,8 +159,7 @@ impl Terms {
             };
             spans.iter().map(of_span).collect::<Vec<_>>()
         };
-        let gains: Vec<Vec<Vec<(f64, usize, usize)>>> =
-            self.pairs.par_iter().enumerate().map(gains).collect();
+        let gains: Vec<Vec<Vec<(f64, usize, usize)>>> = parallel::map(self.pairs.len(), gains);
         let of_span =
             |span: usize| self.best_beside(gains.iter().flat_map(|of| &of[span]).copied());
         (0..spans.len()).map(of_span).collect()
@@ -276,7 +276,7 @@ impl Terms {
     /// Returns all of `terms` with their columns, in chunks of equal width.
     pub fn chunks_of(&self, terms: &[Product], site: &WhitenedSite) -> Vec<Chunk> {
         let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
-        self.groups(terms).par_iter().map(chunk).collect()
+        parallel::map_items(&self.groups(terms), chunk)
     }
 
     /// Returns the `most` of `terms` that alone explain most of the residual, and all terms without
@@ -290,7 +290,7 @@ impl Terms {
         let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
         let (mut best_chunks, mut all_chunks) = (Vec::<Chunk>::new(), Vec::new());
         for some in self.groups(terms).chunks(CHUNKS_AT_ONCE) {
-            let new = some.par_iter().map(chunk).collect::<Vec<Chunk>>();
+            let new = parallel::map_items(some, chunk);
             all_chunks.extend(new.iter().map(Chunk::without_columns));
             best_chunks.extend(new);
             best_chunks = Self::best(best_chunks, most);

@@ -1,9 +1,9 @@
 //! Prediction of each block of poses from the others, by the fit of a linearised model.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::linear::LinearNeighbourhood;
+use crate::numeric::parallel;
 use crate::numeric::{gram, inverse_factor};
 
 /// Smallest fraction of a direction's squared length outside a block of poses at which the other
@@ -39,7 +39,7 @@ impl LinearNeighbourhood {
                 ln_determinant,
             }
         };
-        let blocks: Vec<LeftOutBlock> = (0..blocks).into_par_iter().map(left_out).collect();
+        let blocks = parallel::map(blocks, left_out);
         blocks.iter().all(LeftOutBlock::is_finite).then_some(blocks)
     }
 }

@@ -2,9 +2,9 @@
 //! of each part.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 use super::orthonormal::MIN_INDEPENDENT_LENGTH;
+use crate::numeric::parallel;
 use crate::numeric::{gram, inverse_factor, lower_factor, solve_positive};
 
 /// Products JᵀJ, Jᵀr and rᵀr over some poses, with the number of their rows.
@@ -34,7 +34,7 @@ impl PartSquares {
     /// Each of `parts` contains pose indices.
     pub fn new(columns: &DMatrix<f64>, residual: &DVector<f64>, parts: &[Vec<usize>]) -> Self {
         let every: Vec<usize> = (0..residual.len() / 3).collect();
-        let parts = parts.par_iter().map(|poses| Squares::of(columns, residual, poses)).collect();
+        let parts = parallel::map_items(parts, |poses| Squares::of(columns, residual, poses));
         Self { whole: Squares::of(columns, residual, &every), parts }
     }
 
@@ -110,7 +110,8 @@ impl PartSquares {
                 part.residual + 2.0 * part.product.dot(&step) + step.dot(&(&part.gram * &step));
             Some(part.rows as f64 * (squares / part.rows as f64).ln())
         };
-        let terms: Option<Vec<f64>> = self.parts.par_iter().map(predicted).collect();
+        let terms: Option<Vec<f64>> =
+            parallel::map_items(&self.parts, predicted).into_iter().collect();
         terms.map(|terms| terms.iter().sum()).filter(|sum: &f64| sum.is_finite())
     }
 }

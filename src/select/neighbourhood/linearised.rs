@@ -4,13 +4,13 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
-use rayon::prelude::*;
 
 use crate::fit::Unmoved;
 use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Parameter, ParameterSite, Regressor};
 use crate::model::{LinearModel, Model, Pose, PoseResiduals};
+use crate::numeric::parallel;
 use crate::problem::{Effect, Problem};
 
 /// Mass at which the derivative with respect to the position of an added mass is taken \[kg\]. With
@@ -353,6 +353,6 @@ impl EffectTerms {
         let value = |regressor: &Regressor| {
             regressor.values(linearised.poses.iter().map(|pose| &pose.setup))
         };
-        Self { terms, values: regressors.par_iter().map(value).collect() }
+        Self { terms, values: parallel::map_items(&regressors, value) }
     }
 }

@@ -3,9 +3,9 @@
 use std::borrow::Cow;
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 use crate::numeric::kernel::{dot, sum_of_squares};
+use crate::numeric::parallel;
 use crate::numeric::{
     gram, inverse_factor, inverse_lower, multiply_by_upper, product, product_with_upper,
     product_with_upper_padded, zeros,
@@ -151,8 +151,9 @@ pub(super) fn constrained(
 pub(super) fn lengthened(matrix: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
     let (rows, n) = matrix.shape();
     let mut long = zeros(rows + more, n);
-    let columns = long.as_mut_slice().par_chunks_mut((rows + more).max(1)).enumerate();
-    columns.for_each(|(j, out)| out[..rows].copy_from_slice(matrix.column(j).as_slice()));
+    parallel::write_chunks(long.as_mut_slice(), (rows + more).max(1), &|j, out| {
+        out[..rows].copy_from_slice(matrix.column(j).as_slice());
+    });
     long
 }
 

@@ -1,11 +1,11 @@
 //! Scores of all candidates against the residual of one fit.
 
+use crate::numeric::parallel;
 use crate::select::settings::MAX_NEGATIVE_ERRORS;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 use super::linear::LinearNeighbourhood;
 use super::linearised::{EffectTerms, Linearised};
@@ -73,8 +73,7 @@ impl<'a, 'l> Scan<'a, 'l> {
             let mut scores = linear.scores(&finite).into_iter();
             is_finite.into_iter().map(|fine| if fine { scores.next() } else { None }).collect()
         };
-        let all: Vec<Option<Score>> =
-            numbers.par_chunks(CANDIDATES_PER_PROJECTION).flat_map_iter(scored).collect();
+        let all = parallel::map_chunks(&numbers, CANDIDATES_PER_PROJECTION, scored);
         let mut refused = Vec::new();
         let (mut scored_effects, mut scores) = (Vec::new(), Vec::new());
         for (effect, score) in effects.into_iter().zip(all) {

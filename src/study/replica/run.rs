@@ -1,7 +1,5 @@
 //! Identification of every specimen by every procedure.
 
-use rayon::prelude::*;
-
 use super::alternative::AlternativeModel;
 use super::fit::{ReplicaError, dataset, identify_as_published, position_errors};
 use super::measured_pose::MeasuredPose;
@@ -11,6 +9,7 @@ use super::simulated_arm::SimulatedArm;
 use super::size::sizes;
 use super::study::{Case, MisprintStudy};
 use crate::fit::{ErrorSummary, Options as FitOptions, Strategy, identify};
+use crate::numeric::parallel;
 use crate::paper::{Form, Options, Parameters, Reading, StiffnessStage};
 use crate::problem::Problem;
 use crate::random::stream;
@@ -32,8 +31,9 @@ pub fn replicate(
         done();
         replica
     };
-    let replicas =
-        specimens.par_iter().map(evaluate).collect::<Result<Vec<Replica>, ReplicaError>>()?;
+    let replicas: Result<Vec<Replica>, ReplicaError> =
+        parallel::map_items(&specimens, evaluate).into_iter().collect();
+    let replicas = replicas?;
     Ok(ReplicaResults { sizes: sizes(study), readings, replicas })
 }
 

@@ -1,13 +1,12 @@
 //! Search for wrong masses, and wrong places of masses, of an arm that gives way.
 
-use rayon::prelude::*;
-
 use super::Misreading;
 use super::candidates::{MASS_SCALES, of_masses, of_places};
 use super::explanation::Explanations;
 use super::search::Trial;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::stages::fitting::Fitting;
+use crate::numeric::parallel;
 
 /// Maximum number of rows, evenly spaced, by which the misreadings are ranked.
 const MAX_RANKED_ROWS: usize = 40;
@@ -52,7 +51,8 @@ pub(in crate::fit) fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanatio
         })?;
         error.is_finite().then_some((misreading, error))
     };
-    let mut ranked: Vec<(Misreading, f64)> = tested.par_iter().filter_map(error).collect();
+    let mut ranked: Vec<(Misreading, f64)> =
+        parallel::map_items(&tested, error).into_iter().flatten().collect();
     ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
     let chosen: Vec<Misreading> =
         ranked.into_iter().map(|(misreading, _)| misreading).take(MAX_FITTED).collect();

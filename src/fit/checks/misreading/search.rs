@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use nalgebra::{DVector, Vector3};
-use rayon::prelude::*;
 
 use super::Misreading;
 use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
@@ -20,6 +19,7 @@ use crate::fit::{Placement, SolverChoice};
 use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
+use crate::numeric::parallel;
 use crate::problem::{Observation, Problem};
 
 /// Largest ratio of the rms error with a misreading corrected to that without a correction, at
@@ -222,7 +222,7 @@ impl<'a> Trial<'a> {
     fn registered_errors(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
         let error =
             |&misreading: &Misreading| Some((misreading, self.outcome(misreading, false)?.rms));
-        let errors: Vec<_> = misreadings.par_iter().map(error).collect();
+        let errors = parallel::map_items(misreadings, error);
         errors.into_iter().flatten().collect()
     }
 
@@ -277,7 +277,7 @@ impl<'a> Trial<'a> {
                 left_out: left_out?,
             })
         };
-        let explained: Vec<_> = chosen.par_iter().map(explanation).collect();
+        let explained = parallel::map_items(chosen, explanation);
         let mut explained: Vec<Explanation> =
             explained.into_iter().flatten().filter(|explanation| explanation.rms < limit).collect();
         explained.sort_by(|a, b| a.rms.total_cmp(&b.rms));
