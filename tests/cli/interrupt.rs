@@ -8,8 +8,8 @@ use assert_cmd::cargo::cargo_bin;
 
 use crate::common::program::{Folder, assert_contains, items, texts};
 
-/// Number of poses for which a round of the loop takes seconds.
-const POSES: usize = 400;
+/// Number of poses for which a round of the loop takes long enough to interrupt it.
+const POSES: usize = 200;
 
 /// Returns a folder with measurements of an arm with an effect, most of them for identification.
 fn measured() -> Folder {
