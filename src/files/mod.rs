@@ -79,19 +79,19 @@ pub fn same_file(first: &Path, second: &Path) -> bool {
 /// Returns CSV text with a header line; every line must have as many cells as the header. Words
 /// that a spreadsheet would run as a formula are escaped; see [`unescape_cell`].
 pub(crate) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<String>>) -> String {
-    separated(b',', header, lines)
+    separated(b',', header, &mut lines.into_iter())
 }
 
 /// Formats a table with semicolons between the cells, which may then have decimal commas.
 pub(crate) fn csv_with_semicolons(header: Vec<String>, lines: Vec<Vec<String>>) -> String {
-    separated(b';', header, lines)
+    separated(b';', header, &mut lines.into_iter())
 }
 
 /// Formats a table with a delimiter between the cells.
 fn separated(
     delimiter: u8,
     header: Vec<String>,
-    lines: impl IntoIterator<Item = Vec<String>>,
+    lines: &mut dyn Iterator<Item = Vec<String>>,
 ) -> String {
     let mut writer = csv::WriterBuilder::new().delimiter(delimiter).from_writer(Vec::new());
     for line in std::iter::once(header).chain(lines) {

@@ -80,7 +80,7 @@ macro_rules! catalogue {
 
             /// Creates the effect of the family `name` from its arguments by key; `None` if there
             /// is no such family, or if an argument is missing or of another kind.
-            pub(crate) fn from_name(name: &str, argument: impl Fn(&str) -> Option<Argument>) -> Option<Self> {
+            pub(crate) fn from_name(name: &str, argument: &dyn Fn(&str) -> Option<Argument>) -> Option<Self> {
                 match name {
                     $($name => Some(Self::$variant $({
                         $($field: <$type>::of(&argument(key!($field $($key)?))?)?),+

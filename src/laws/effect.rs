@@ -380,7 +380,7 @@ impl Effect {
     /// kind, and for laws.
     fn with(&self, key: &str, value: &Argument) -> Option<Self> {
         let arguments = self.arguments();
-        Self::from_name(self.name(), |wanted| {
+        Self::from_name(self.name(), &|wanted| {
             let present = || arguments.iter().find(|(known, _)| *known == wanted);
             if wanted == key {
                 Some(value.clone())

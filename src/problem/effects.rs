@@ -178,5 +178,5 @@ pub(crate) fn effect(
     arguments.section.finish()?;
     let argument =
         |key: &str| found.iter().find(|(known, _)| *known == key).map(|(_, value)| value.clone());
-    Effect::from_name(name, argument).ok_or_else(unknown)
+    Effect::from_name(name, &argument).ok_or_else(unknown)
 }

@@ -38,7 +38,11 @@ pub trait Document: Serialize + JsonSchema + Sized {
 /// ending in a line break. `is_sealed` is true if the files end in a digest of each key.
 pub(super) fn schema_of<T: JsonSchema>(name: &'static str, is_sealed: bool) -> String {
     let settings = SchemaSettings::draft2020_12().for_serialize();
-    let mut schema = settings.into_generator().into_root_schema_for::<T>();
+    completed(settings.into_generator().into_root_schema_for::<T>(), name, is_sealed)
+}
+
+/// Completes a generated schema for [`schema_of`].
+fn completed(mut schema: Schema, name: &'static str, is_sealed: bool) -> String {
     RecursiveTransform(allow_null_numbers).transform(&mut schema);
     schema.remove("description");
     schema.insert("title".to_owned(), name.into());

@@ -49,7 +49,7 @@ pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
             let argument = |key: &str| {
                 arguments.iter().find(|(name, _)| *name == key).map(|(_, value)| value.clone())
             };
-            let effect = Effect::from_name(family.name, argument)?;
+            let effect = Effect::from_name(family.name, &argument)?;
             let conceivable = family.only.iter().all(|only| effect.meets_condition(*only, problem));
             conceivable.then(|| {
                 let untestable =
