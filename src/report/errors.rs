@@ -40,13 +40,9 @@ pub(super) fn unit(of: &ErrorSummary) -> &'static str {
     of.unit().in_tables().symbol
 }
 
-/// Returns one of three table headers, that for the unit of the errors: mm, ° or px.
-pub(super) fn header(of: &ErrorSummary, [mm, degrees, px]: [&'static str; 3]) -> &'static str {
-    match of.unit() {
-        Unit::Angle => degrees,
-        Unit::Pixel => px,
-        _ => mm,
-    }
+/// Returns a table header with the unit of the errors after it.
+pub(super) fn with_unit_of(of: &ErrorSummary, words: &str) -> String {
+    format!("{words}, {}", unit(of))
 }
 
 /// Formats the mean, rms and largest error length.

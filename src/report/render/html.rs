@@ -249,7 +249,7 @@ fn table(table: &Table) -> Markup {
         }
         // Rows that continue the row above cannot be sorted.
         @let sorts = table.rows.len() > 3 && table.rows.iter().all(|row| row.first().is_some_and(|cell| !cell.is_empty()));
-        div.scroll tabindex="0" role="region" aria-label={ (TABLE_LABEL) (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts].many[table.header.len() > MAX_ONE_LINE_COLUMNS] {
+        div.scroll tabindex="0" role="region" aria-label={ (TABLE_LABEL) (table.header.iter().find(|head| !head.is_empty()).map_or("", String::as_str)) } { table.sort[sorts].many[table.header.len() > MAX_ONE_LINE_COLUMNS] {
             thead { tr {
                 // An empty cell is no header.
                 @for (k, text) in table.header.iter().enumerate() {
