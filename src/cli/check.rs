@@ -10,10 +10,10 @@ use flexcal::problem::Problem;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{CheckResult, Document as _};
 
-use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::poses::{Source, parse_count};
+use super::poses::Source;
+use super::{diagnostic, values};
 
 /// Arguments of `flexcal check`.
 #[derive(Debug, Args)]
@@ -30,7 +30,7 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to draw
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::count::<10_000>)]
     poses: Option<u32>,
     #[command(flatten)]
     source: Source,

@@ -32,12 +32,11 @@ mod poses;
 mod predict;
 mod progress;
 mod region;
-mod remainder;
 mod simulate;
 mod study;
 mod threads;
-mod tolerance;
 mod trace;
+mod values;
 mod watch;
 
 use std::ffi::OsString;

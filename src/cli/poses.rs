@@ -11,12 +11,6 @@ use flexcal::rig::Truth;
 
 use super::flags::{Flags, file_in};
 
-/// Parses a number of poses from 1 to `MAX`.
-pub fn parse_count<const MAX: u32>(text: &str) -> Result<u32, String> {
-    let number = text.parse().ok().filter(|number| (1..=MAX).contains(number));
-    number.ok_or_else(|| format!("a whole number from 1 to {MAX} is needed, such as 40"))
-}
-
 /// Arguments for the ranges in which poses are drawn, or for tables of poses.
 #[derive(Debug, Args)]
 pub struct Source {

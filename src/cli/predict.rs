@@ -15,7 +15,7 @@ use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residua
 use super::estimate::Trust;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::{advice, diagnostic};
+use super::{advice, diagnostic, values};
 
 /// Arguments of `flexcal predict`.
 #[derive(Debug, Args)]
@@ -37,7 +37,7 @@ pub struct Arguments {
     #[arg(long, value_name = "ESTIMATE.json")]
     estimate: Option<PathBuf>,
     /// Probability with which the bound of an error holds
-    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::parse_level)]
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = values::level)]
     level: f64,
     #[command(flatten)]
     trust: Trust,
@@ -91,9 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let bounds = bounds.as_ref();
     let measured = prediction.residuals.as_deref().unwrap_or_default();
-    if let Some(words) = common_error(&rows, measured).filter(|_| !common.quiet) {
-        diagnostic::warn(&words);
-    }
+    common.hint(common_error(&rows, measured));
     let is_position = |row: usize| rows.observation(row).is_position();
     let bounds_suffice = bounds.is_some() && (0..rows.len()).all(is_position);
     let errors = estimate

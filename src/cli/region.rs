@@ -3,14 +3,16 @@
 use clap::Args;
 use flexcal::design::{RegionError, Workspace};
 
+use super::values;
+
 /// Arguments for the box and the half-spaces in which the nominal target must stay.
 #[derive(Debug, Args)]
 pub struct Region {
     /// Box that the nominal target stays in, frame of the arm's base
-    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = parse_numbers::<6>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = values::numbers::<6>, allow_hyphen_values = true)]
     workspace_mm: Option<[f64; 6]>,
     /// Plane that the nominal target stays beyond, frame of the arm's base: N·p ≥ D for a normal N
-    #[arg(long, value_name = "NX,NY,NZ,D", value_parser = parse_numbers::<4>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "NX,NY,NZ,D", value_parser = values::numbers::<4>, allow_hyphen_values = true)]
     keep_out_mm: Vec<[f64; 4]>,
 }
 
@@ -24,9 +26,7 @@ impl Region {
     pub fn workspace(&self) -> Result<Option<Workspace>, RegionArgumentError> {
         Ok(Workspace::from_mm(self.workspace_mm, &self.keep_out_mm)?)
     }
-}
 
-impl Region {
     /// Formats the arguments of the region as they are given on the command line.
     pub fn words(&self) -> Vec<String> {
         let listed =
@@ -35,15 +35,4 @@ impl Region {
         let planes = self.keep_out_mm.iter().map(|of| format!("--keep-out-mm={}", listed(of)));
         corners.chain(planes).collect()
     }
-}
-
-/// Parses exactly `N` finite numbers with commas between them.
-pub fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let numbers = text
-        .split(',')
-        .map(|word| word.trim().parse().ok().filter(|number: &f64| number.is_finite()));
-    let numbers: Option<Vec<f64>> = numbers.collect();
-    numbers
-        .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(|| format!("not {N} numbers with commas between them"))
 }

@@ -11,10 +11,9 @@ use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, WatchResult};
 
 use super::estimate::Trust;
-use super::identify::parse_days;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::{advice, diagnostic};
+use super::{advice, diagnostic, values};
 
 /// Arguments of `flexcal watch`.
 #[derive(Debug, Args)]
@@ -29,19 +28,13 @@ pub struct Arguments {
     #[arg(long, value_name = "ESTIMATE.json")]
     estimate: PathBuf,
     /// Days since the estimate, whose drift counts as no change
-    #[arg(long, value_name = "DAYS", default_value_t = 0.0, value_parser = parse_days)]
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0, value_parser = values::days)]
     drift: f64,
     /// Probability of an alarm at any row if nothing has changed
-    #[arg(long, value_name = "P", default_value_t = 0.01, value_parser = parse_probability)]
+    #[arg(long, value_name = "P", default_value_t = 0.01, value_parser = values::number(|p| p > 0.0 && p <= 0.5, "a probability above 0 and up to 0.5 is expected"))]
     false_alarms: f64,
     #[command(flatten)]
     trust: Trust,
-}
-
-/// Parses a probability greater than 0 and at most 0.5.
-fn parse_probability(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && *number <= 0.5);
-    number.ok_or_else(|| "a probability above 0 and up to 0.5 is expected".to_owned())
 }
 
 /// Returns the argument with the days since the estimate; empty for none.

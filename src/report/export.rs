@@ -222,6 +222,10 @@ fn comparison_blocks<'a>(
     let rows = listed.map(|entry| row(&entry)).collect();
     vec![
         Block::Text(verdict),
-        Block::Table(Table::new(&[&format!("{heading}, {unit}"), "mean", "rms", "max"], rows, &[0])),
+        Block::Table(Table::new(
+            &[&format!("{heading}, {unit}"), "mean", "rms", "max"],
+            rows,
+            &[0],
+        )),
     ]
 }
