@@ -1,9 +1,10 @@
 //! Texts of the command `compare`: every strategy, solver and ablation, and the paper's tables 2
 //! and 3.
 
-use super::arm_names::NOMINAL_ARM;
 use super::document::{Block, Column, Headline, Table, code};
-use super::errors::{both_parts, held_out_rows, row_noun, test_rows_word, unit, with_unit_of};
+use super::errors::{
+    NOMINAL_ARM, both_parts, held_out_rows, row_noun, test_rows_word, unit, with_unit_of,
+};
 use super::figures;
 use super::identify::{
     errors_by_axis, fit_details, fit_sentence, fit_warnings, mean_error, no_errors,

@@ -1,5 +1,5 @@
-//! Errors in words: labels and units by kind of rows, counts of rows, and poses without an
-//! equilibrium.
+//! Errors in words: names of arms, labels and units by kind of rows, counts of rows, and poses
+//! without an equilibrium.
 
 use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::observation::kind_named;
@@ -146,3 +146,10 @@ pub(super) fn without_equilibrium(of: &ErrorSummary, poses: &str) -> String {
         counted(of.n, &format!("{poses} pose"))
     )
 }
+
+/// Name of the nominal arm, with base and tool fitted if these are free.
+pub(super) const NOMINAL_ARM: &str = "nominal arm";
+/// Name of the fitted arm of the declared problem.
+pub(super) const DECLARED_ARM: &str = "as declared, fitted";
+/// Name of the arm of the extended problem.
+pub(super) const EXTENDED_ARM: &str = "with what was found";

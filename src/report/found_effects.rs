@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Column, Point, Table, split_at_most};
+use super::document::{Block, Column, Point, Table, percent, split_at_most};
 use super::errors::with_unit_of;
-use super::probability::percent;
 use super::verdict::{alternative, has_place, stand_in_sentence, title};
 use super::{effect, figures, trace};
 use crate::problem::Effect;

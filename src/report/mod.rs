@@ -5,7 +5,6 @@
 //! of pages.
 
 mod acceptance;
-mod arm_names;
 mod brief;
 mod candidates;
 mod check;
@@ -25,9 +24,6 @@ mod forecast;
 mod found_effects;
 mod identify;
 mod init;
-mod limited_poses;
-mod limits;
-mod misplaced;
 mod next;
 mod noise;
 mod paper_tables;
@@ -35,17 +31,14 @@ mod parameters;
 mod plan;
 mod predict;
 mod prior;
-mod probability;
 mod remainder;
 mod render;
 mod replica;
 mod residual_tests;
 mod row_kinds;
-mod separation;
 mod shell;
 mod study;
 mod trace;
-mod trust;
 mod unexplained;
 mod verdict;
 mod watch;
@@ -82,11 +75,11 @@ pub use self::{
     closed_loop::loop_brief,
     closed_problem::closed_problem,
     compare::{compare_text, comparison_report},
+    compensate::Doubts,
     compensate::commands_text,
     export::{ExportRemarks, better_geometry, export_text, kept_at_end, set_up_comment},
     figures::is_figure,
     identify::why_not_trusted,
-    misplaced::Doubts,
     next::next_text,
     plan::plan_text,
     remainder::remainder_text,

@@ -1,9 +1,8 @@
 //! Text and page of the command `next`: the poses to measure next, or that there are enough.
 
-use super::candidates::{candidates_drawn, few_in_view};
+use super::candidates::{at_limits, candidates_drawn, few_in_view};
 use super::document::{Block, Table, code, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
-use super::limited_poses::at_limits;
 use super::render::{page, text};
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
 use crate::fit::Noise;

@@ -3,10 +3,9 @@
 use std::fmt::Write as _;
 
 use super::detection::has_no_mass;
-use super::document::{Block, Point, joined, opening};
+use super::document::{Block, MIN_PROBABLE, Point, joined, opening, percent};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::format_chi2;
-use super::probability::{MIN_PROBABLE, percent};
 use super::render::{page, text};
 use super::verdict::declared;
 use super::{effect, figures, residual_tests};
@@ -16,10 +15,9 @@ use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::{counted, number, p_value};
 use crate::results::{
-    Candidate, Claims, Confounded, Hypothesis, HypothesisSet, PlotData, SeparatingPose, Summary,
-    TraceResult, at_place,
+    Candidate, Claims, CommandedJoint, Confounded, Hypothesis, HypothesisSet, PlotData,
+    SeparatingPose, Summary, TraceResult, at_place, commanded_joints,
 };
-use crate::results::{CommandedJoint, commanded_joints};
 use crate::select::Trace;
 
 /// Maximum number of candidates that a text lists.

@@ -2,8 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::document::code;
-use super::probability::{MIN_PROBABLE, percent};
+use super::document::{MIN_PROBABLE, code, percent};
 use crate::fit::Noise;
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::are_all_fixed;

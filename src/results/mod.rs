@@ -26,7 +26,6 @@ mod next;
 pub(crate) mod plots;
 mod prior;
 mod remainder;
-mod residual_size;
 mod residual_test;
 mod study;
 mod summary;
@@ -55,7 +54,7 @@ pub(crate) use plots::{
     sample,
 };
 pub(crate) use remainder::REMAINDER_FILE;
-pub(crate) use residual_size::{ResidualSize, exceeds_noise};
+pub(crate) use residual_test::{ResidualSize, exceeds_noise};
 pub(crate) use study::Cell;
 pub(crate) use summary::{Summary, measured_kinds, nominal_arm, registered_parts, rows_in};
 pub(crate) use tables::{

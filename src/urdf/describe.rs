@@ -1,4 +1,4 @@
-//! Conversion of a chain to the text of a problem.
+//! Conversion of a chain to the text of a problem, with the masses of its links.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt::Write as _;
@@ -6,16 +6,14 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::chain::Chain;
+use super::chain::{Chain, moved};
 use super::free::distinguishable_parameters;
 use super::lines::Step;
 use super::notes;
 use super::read::Kind;
-use super::weights::carried_masses;
 use crate::error::InputError;
-use crate::problem::Problem;
-use crate::problem::quoted;
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
+use crate::problem::{Problem, quoted};
 use crate::spatial::Frame;
 
 /// Largest magnitude that counts as zero \[rad\] or \[m\]. Right angles written with eleven
@@ -409,4 +407,53 @@ fn data(chain: &Chain, rows: &[Row], has_camera: bool) -> String {
         chain.ends().1
     );
     text
+}
+
+/// Mass of a link of the chain or of a branch of it, with the moving joint that moves it.
+pub(super) struct CarriedMass {
+    /// Index of the last moving joint of the chain before the link, among the stages.
+    pub stage: usize,
+    /// Name of the link.
+    pub name: String,
+    /// Mass of the link \[kg\].
+    pub mass: f64,
+    /// Centre of mass with all joints at zero, frame of the chain's base \[m\].
+    pub at: Vector3<f64>,
+}
+
+/// Returns all links with a mass that the chain's moving joints move, in the order of the joints.
+/// Also returns the names of the other moving joints that they move, which are taken at zero.
+pub(super) fn carried_masses(chain: &Chain) -> (Vec<CarriedMass>, Vec<String>) {
+    let robot = chain.robot;
+    let (mut masses, mut beside) = (Vec::new(), Vec::new());
+    // Each entry is a link with its frame and the stage that moves it, from the base outwards.
+    let mut open = vec![(chain.base, Frame::identity(), None)];
+    while let Some((link, frame, carrier)) = open.pop() {
+        if let (Some(stage), Some(body)) = (carrier, robot.links.get(link))
+            && body.mass > 0.0
+        {
+            masses.push(CarriedMass {
+                stage,
+                name: body.name.clone(),
+                mass: body.mass,
+                at: frame.point(&body.com),
+            });
+        }
+        for (index, joint) in
+            robot.joints.iter().enumerate().filter(|(_, joint)| joint.parent == link)
+        {
+            let mut next = frame.compose(&joint.origin.frame());
+            let stage = chain.stages.iter().position(|stage| stage.joint == index);
+            if let Some(moving) = stage.and_then(|stage| chain.stages.get(stage)) {
+                // A mimic joint may have an offset when its leader is at zero.
+                next = moved(&next.compose(&moving.axis), joint, moving.offset)
+                    .compose(&moving.axis.inverse());
+            } else if joint.kind != Kind::Fixed && carrier.is_some() {
+                beside.push(joint.name.clone());
+            }
+            open.push((joint.child, next, stage.or(carrier)));
+        }
+    }
+    masses.sort_by_key(|link| link.stage);
+    (masses, beside)
 }

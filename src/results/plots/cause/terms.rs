@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::axis::Quantity;
+use super::figure::Quantity;
 use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{PoseView, Problem};

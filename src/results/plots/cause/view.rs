@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::axis::{Quantity, is_prismatic};
+use super::figure::{Quantity, is_prismatic};
 use super::terms::{EffectRows, Law};
 use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
