@@ -63,8 +63,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let check =
         design::check(&problem, &checked_poses(arguments, &problem)?, arguments.source.seed)?;
     let json = CheckResult::new(&problem, &check).to_json();
-    let page = report::check_page(&problem, &check);
-    results.write(&[("check.json", &json), ("check.html", &page)])?;
+    let story = report::check(&problem, &check);
+    results.write(&[("check.json", &json), ("check.html", &story.page())])?;
     common.print_result(&json, || {
         let problem_word = shell_word(common.problem());
         let is_measured = arguments.poses.is_none() && arguments.source.candidates.is_empty();
@@ -75,8 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             format!("flexcal plan {problem_word} --poses N chooses poses that tell more")
         };
-        let text = report::check_text(&problem, &check);
-        format!("{text}{}Next: {next}\n", results.written())
+        format!("{}{}Next: {next}\n", story.text(), results.written())
     })?;
     if check.suffices() {
         return Ok(Outcome::Done);

@@ -184,16 +184,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = NextResult::new(&problem, &options, &next).to_json();
     let table = poses_csv(&problem, &next.poses);
     interrupt::begin_writing();
-    let page = report::next_page(&problem, &options, &next);
+    let story = report::next(&problem, &options, &next);
+    let page = story.page();
     let mut texts = vec![("next.json", json.as_str()), ("next.html", page.as_str())];
     if !next.poses.is_empty() {
         texts.push(("next.csv", table.as_str()));
     }
     results.write(&texts)?;
     common.print_result(&json, || {
-        let text = report::next_text(&problem, &options, &next);
         let step = next_step(arguments, &problem, (&next, &options), &results);
-        format!("{text}{}Next: {step}\n", results.written())
+        format!("{}{}Next: {step}\n", story.text(), results.written())
     })?;
     if !next.found.is_trusted() {
         diagnostic::warn(

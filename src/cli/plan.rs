@@ -134,13 +134,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json =
         PlanResult::new(&problem, criterion, source.seed, &plan, separated.as_ref()).to_json();
     let table = poses_csv(&problem, &plan.poses);
-    let page = report::plan_page(&problem, criterion, &plan, separated.as_ref());
-    results.write(&[("plan.csv", &table), ("plan.json", &json), ("plan.html", &page)])?;
+    let story = report::plan(&problem, criterion, &plan, separated.as_ref());
+    results.write(&[("plan.csv", &table), ("plan.json", &json), ("plan.html", &story.page())])?;
     common.print_result(&json, || {
-        let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
         let table = results.path("plan.csv");
         let next = next_step(common, &problem, &declared_files, &table, &plan, pair.is_some());
-        format!("{text}{}Next: {next}\n", results.written())
+        format!("{}{}Next: {next}\n", story.text(), results.written())
     })?;
     if plan.suffices {
         return Ok(Outcome::Done);

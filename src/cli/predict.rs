@@ -120,15 +120,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     });
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
-    texts.push((
-        RESULT_FILES[3],
-        report::prediction_page(&problem, arm, &prediction, (tested, &fitted)),
-    ));
+    let story = report::prediction(&problem, arm, &prediction, (tested, &fitted));
+    texts.push((RESULT_FILES[3], story.page()));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
     common.print_result(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
-        let text = report::prediction_text(&problem, arm, &prediction, (tested, &fitted));
+        let text = story.text();
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let next = match (&arguments.estimate, &estimate) {
             (Some(file), _) if fitted.is_empty() && test.is_some_and(|of| of.is_contradicted()) => format!(

@@ -88,8 +88,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let watch = life::watch(&problem, &estimate, &rows, settings)?;
     let named = arguments.estimate.display().to_string();
     let json = WatchResult::new(&problem, &named, arguments.drift, &watch).to_json();
-    let page = report::watch_page(&problem, &watch, &rows);
-    results.write(&[("watch.json", &json), ("watch.html", &page)])?;
+    let story = report::watch(&problem, &watch, &rows);
+    results.write(&[("watch.json", &json), ("watch.html", &story.page())])?;
     common.print_result(&json, || {
         let file = shell_word(&arguments.estimate);
         let first = watch.causes.first().map(|cause| cause.kind);
@@ -124,8 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             advice::after_applying(common, &problem, &estimate, &arguments.estimate)
         };
-        let text = report::watch_text(&problem, &watch);
-        format!("{text}{}Next: {next}\n", results.written())
+        format!("{}{}Next: {next}\n", story.text(), results.written())
     })?;
     Ok(if watch.is_changed() { Outcome::Changed } else { Outcome::Done })
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Table, last_parts};
 use super::figures::{ACCENT, Drawing, FAINT, Forest, INK, WARM};
-use super::render::{page, text};
+use super::render::Story;
 use crate::life::{Fleet, FleetArm, FleetParameter};
 use crate::quantity::format::{counted, number, or_dash, two_digits};
 
@@ -15,14 +15,9 @@ const ARM_HEADER: [&str; 4] = ["arm", "", "deviates most in", "sigmas"];
 /// Maximum number of decimals of a deviation.
 const MAX_DECIMALS: usize = 5;
 
-/// Returns the fleet as text, ending in a line break.
-pub fn fleet_text(fleet: &Fleet) -> String {
-    text(&blocks(fleet))
-}
-
-/// Returns the fleet as a page, with its arms and parameters drawn.
-pub(crate) fn fleet_page(fleet: &Fleet) -> String {
-    page(&fleet.problem, "fleet", &blocks(fleet))
+/// Returns the fleet, with its arms and parameters drawn.
+pub(crate) fn fleet(fleet: &Fleet) -> Story {
+    Story::new(&fleet.problem, "fleet", blocks(fleet))
 }
 
 fn blocks<'a>(fleet: &Fleet) -> Vec<Block<'a>> {

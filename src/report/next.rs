@@ -3,7 +3,7 @@
 use super::candidates::{at_limits, candidates_drawn, few_in_view};
 use super::document::{Block, Table, code, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
-use super::render::{page, text};
+use super::render::Story;
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
 use crate::fit::Noise;
 use crate::measurement::Measurements;
@@ -11,14 +11,9 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number, or_dash};
 use crate::results::{CommandedJoint, commanded_joints, pose_columns};
 
-/// Returns the text of a choice of poses, ending in a line break.
-pub fn next_text(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
-    text(&blocks(problem, options, next))
-}
-
-/// Returns the page of a choice of poses, with a figure of the error expected after each of them.
-pub(crate) fn next_page(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
-    page(&problem.title, "next poses", &blocks(problem, options, next))
+/// Returns a choice of poses, with a figure of the error expected after each of them.
+pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story {
+    Story::new(&problem.title, "next poses", blocks(problem, options, next))
 }
 
 fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec<Block<'a>> {

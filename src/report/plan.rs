@@ -7,7 +7,7 @@ use super::figures::{ACCENT, Drawing, Forest};
 use super::forecast::{assumptions, cells, separation_blocks};
 use super::next::command_table;
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
-use super::render::{page, text};
+use super::render::Story;
 use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
@@ -39,33 +39,14 @@ fn sufficiency<'a>(plan: &Plan) -> Block<'a> {
     ))
 }
 
-/// Returns the plan as text, ending in a line break; `separated` is given if the plan is to
-/// distinguish two effects.
-pub fn plan_text(
+/// Returns the plan, with a figure of the gain over random poses; `separated` is given if the plan is
+/// to distinguish two effects.
+pub fn plan(
     problem: &Problem,
     criterion: &Criterion,
     plan: &Plan,
     separated: Option<&PairSeparation>,
-) -> String {
-    text(&blocks(problem, criterion, plan, separated))
-}
-
-/// Returns the plan as a page, with a figure of the gain over random poses.
-pub(crate) fn plan_page(
-    problem: &Problem,
-    criterion: &Criterion,
-    plan: &Plan,
-    separated: Option<&PairSeparation>,
-) -> String {
-    page(&problem.title, "plan", &blocks(problem, criterion, plan, separated))
-}
-
-fn blocks<'a>(
-    problem: &Problem,
-    criterion: &Criterion,
-    plan: &Plan,
-    separated: Option<&'a PairSeparation>,
-) -> Vec<Block<'a>> {
+) -> Story {
     let planned = &plan.planned;
     let (poses, given) = (plan.poses.len(), plan.given);
     let besides =
@@ -123,7 +104,7 @@ fn blocks<'a>(
         Block::heading("The planned poses"),
         Block::Table(command_table(problem, &plan.poses)),
     ]));
-    blocks
+    Story::new(&problem.title, "plan", blocks)
 }
 
 /// Returns the letter of a criterion with the quantity that it minimises.

@@ -6,7 +6,7 @@ use super::detection::has_no_mass;
 use super::document::{Block, MIN_PROBABLE, Point, joined, opening, percent};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::format_chi2;
-use super::render::{page, text};
+use super::render::Story;
 use super::verdict::declared;
 use super::{effect, figures, residual_tests};
 use crate::fit::Identification;
@@ -27,14 +27,10 @@ const MAX_SHOWN_SETS: usize = 4;
 /// Maximum number of confounded effects that are named for a candidate.
 const MAX_SHOWN_CONFOUNDED: usize = 3;
 
-/// Returns the result of the command `trace` as text, ending in a line break.
-pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
-    text(&blocks(problem, trace, None))
-}
-
-/// Returns the result as a page, with figures of the ranking and of the residuals in `plots`.
-pub(crate) fn trace_page(problem: &Problem, trace: &Trace, plots: &PlotData) -> String {
-    page(&problem.title, "trace", &blocks(problem, trace, Some(plots)))
+/// Returns the result of the command `trace`; with `plots`, its page has figures of the ranking and
+/// of the residuals.
+pub fn trace(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Story {
+    Story::new(&problem.title, "trace", blocks(problem, trace, plots))
 }
 
 fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec<Block<'a>> {
