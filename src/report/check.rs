@@ -14,10 +14,6 @@ use crate::quantity::format::{counted, mm};
 /// Returns the forecast of the command `check`, with a figure of the error of predictions against
 /// the number of poses.
 pub fn check(problem: &Problem, check: &Check) -> Story {
-    Story::new(&problem.title, "check", blocks(problem, check))
-}
-
-fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
     let forecast = &check.forecast;
     let names: Vec<String> =
         forecast.expected.iter().map(|expected| expected.name.clone()).collect();
@@ -60,7 +56,7 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
     let poses = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
     blocks.extend(assumptions(problem, &forecast.expected, poses));
     blocks.extend(detection::blocks(problem, &check.detection));
-    blocks
+    Story::new(&problem.title, "check", blocks)
 }
 
 /// Draws the expected error of predictions against the number of poses.

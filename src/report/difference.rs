@@ -84,10 +84,6 @@ impl Difference {
 
 /// Returns the comparison; its page has all parameters.
 pub(crate) fn difference(sides: &[Side; 2]) -> Story {
-    Story::new(sides[0].estimate.problem_name(), "two results", blocks(sides))
-}
-
-fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
     let differences = differences(sides);
     let tested = differences.iter().filter(|of| of.sigmas().is_some()).count();
     let limit =
@@ -120,7 +116,7 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
         blocks.push(Block::Words(vec![Block::Text(words)]));
     }
     blocks.push(Block::Page(vec![Block::Table(table(&differences))]));
-    blocks
+    Story::new(sides[0].estimate.problem_name(), "two results", blocks)
 }
 
 /// States the mean errors without the remainder of each side that has one.

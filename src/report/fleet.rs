@@ -17,10 +17,6 @@ const MAX_DECIMALS: usize = 5;
 
 /// Returns the fleet, with its arms and parameters drawn.
 pub(crate) fn fleet(fleet: &Fleet) -> Story {
-    Story::new(&fleet.problem, "fleet", blocks(fleet))
-}
-
-fn blocks<'a>(fleet: &Fleet) -> Vec<Block<'a>> {
     let unlike = fleet.arms.iter().filter(|arm| arm.is_unlike).count();
     let verdict = match unlike {
         0 => "no arm is unlike the others".to_owned(),
@@ -36,12 +32,13 @@ fn blocks<'a>(fleet: &Fleet) -> Vec<Block<'a>> {
     let notes = [
         "deviations from nominal; spread: 1 σ of the next arm about the mean; data sheet: declared 1 σ",
     ];
-    vec![
+    let blocks = vec![
         Block::lines(head),
         Block::figures([draw_arms(fleet), draw_parameters(fleet)]),
         Block::Table(Table::new(&PARAMETER_HEADER, parameters, &[0]).noted(&notes)),
         Block::Table(Table::new(&ARM_HEADER, arms, &[0, 1, 2])),
-    ]
+    ];
+    Story::new(&fleet.problem, "fleet", blocks)
 }
 
 /// Draws the largest deviation of each arm from the other arms.

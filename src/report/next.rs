@@ -13,10 +13,6 @@ use crate::results::{CommandedJoint, commanded_joints, pose_columns};
 
 /// Returns a choice of poses, with a figure of the error expected after each of them.
 pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story {
-    Story::new(&problem.title, "next poses", blocks(problem, options, next))
-}
-
-fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec<Block<'a>> {
     let percent = number(options.level * 100.0, 1);
     let percent = percent.trim_end_matches(".0");
     let counts = format!(
@@ -49,7 +45,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
             Block::Table(command_table(problem, &next.poses)),
         ]));
     }
-    blocks
+    Story::new(&problem.title, "next poses", blocks)
 }
 
 /// States the error in the workspace with its bound, which holds with a probability of `percent` %,

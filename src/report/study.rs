@@ -14,10 +14,6 @@ type TimedCell = (Cell, f64);
 
 /// Returns the study, with a figure of the error of each cell.
 pub fn study(study: &Study, results: &Results) -> Story {
-    Story::new(&study.title, "study", blocks(study, results))
-}
-
-fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
     let by = match study.source {
         Source::Model => "simulated with the model itself",
         Source::Rig => "measured by the virtual test rig",
@@ -66,7 +62,14 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
     ]);
     let [titled, untitled] = opening(&study.title, head);
     let conclusion = Block::lines(conclusion(&cells));
-    vec![titled, untitled, conclusion, Block::Table(table), Block::figures([draw_errors(&cells)])]
+    let blocks = vec![
+        titled,
+        untitled,
+        conclusion,
+        Block::Table(table),
+        Block::figures([draw_errors(&cells)]),
+    ];
+    Story::new(&study.title, "study", blocks)
 }
 
 /// States the cell with the smallest rms error of held-out poses, and the cells without a fit that

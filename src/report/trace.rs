@@ -30,10 +30,6 @@ const MAX_SHOWN_CONFOUNDED: usize = 3;
 /// Returns the result of the command `trace`; with `plots`, its page has figures of the ranking and
 /// of the residuals.
 pub fn trace(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Story {
-    Story::new(&problem.title, "trace", blocks(problem, trace, plots))
-}
-
-fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec<Block<'a>> {
     let result = TraceResult::new(problem, trace);
     let mut blocks = opening(&problem.title, headline(&trace.fit)).to_vec();
     blocks.push(Block::Text(verdict(&result)));
@@ -53,7 +49,7 @@ fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec
         ])
     }));
     blocks.extend(undetectable_effects(problem, trace));
-    blocks
+    Story::new(&problem.title, "trace", blocks)
 }
 
 fn headline(fit: &Identification) -> String {

@@ -21,10 +21,6 @@ const MIN_EXPECTED_P: f64 = 0.01;
 
 /// Returns the verdict, with a figure of the evidence after each of the tested `rows`.
 pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> Story {
-    Story::new(&problem.title, "watch", blocks(problem, watch, rows))
-}
-
-fn blocks<'a>(problem: &Problem, watch: &Watch, rows: &Measurements) -> Vec<Block<'a>> {
     let unit = watch.unit.display(0.0);
     let in_unit = |error: f64| format!("{} {}", two_digits(error * unit.factor, 4), unit.symbol);
     let (chi2, coordinates, p) = watch.chi2;
@@ -71,7 +67,7 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, rows: &Measurements) -> Vec<Bloc
         ];
         blocks.push(Block::Table(Table::new(&HEADER, rows, &[0, 2]).noted(&notes)));
     }
-    blocks
+    Story::new(&problem.title, "watch", blocks)
 }
 
 /// Draws the evidence for a change after each row, with the level of an alarm; `None` for fewer
