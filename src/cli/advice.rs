@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexcal::fit::{Finding, FindingCode, Identification, SavedEstimate, Strategy};
+use flexcal::fit::{FindingCode, Identification, SavedEstimate, Strategy};
 use flexcal::problem::{Fixture, PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
@@ -70,9 +70,15 @@ pub fn after_fit(
         Some(look) => {
             format!("{look}; if they are right, {search}")
         }
-        None if found.finding(FindingCode::Misread).is_some_and(is_partial) => format!(
-            "check what the warning names, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
-        ),
+        // A misreading with another remedy leaves more than noise, so that it explains a part only.
+        None if found
+            .finding(FindingCode::Misread)
+            .is_some_and(|misread| misread.remedy != FindingCode::Misread.entry().remedy) =>
+        {
+            format!(
+                "check what the warning names, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
+            )
+        }
         None if found.has(FindingCode::Misread) => format!(
             "correct the table or {} as the warning says, then flexcal identify {named}",
             common.problem_file().display()
@@ -127,23 +133,16 @@ pub fn after_fit(
         None if found.has(FindingCode::HeldOutOutliers) => {
             format!("check the held-out rows that the warning names; if they are right, {search}")
         }
-        None if found.finding(FindingCode::NarrowPoses).is_some_and(are_alike) => {
+        None if found
+            .finding(FindingCode::NarrowPoses)
+            .is_some_and(|narrow| narrow.value("alike").is_some_and(|alike| alike == true)) =>
+        {
             format!(
                 "flexcal plan {named} --poses N chooses poses over the whole range of the joints"
             )
         }
         None => to_apply("corrects commands"),
     }
-}
-
-/// Returns true if all fitted poses are alike, not only the values of some joints.
-fn are_alike(narrow: &Finding) -> bool {
-    narrow.value("alike").is_some_and(|alike| alike == true)
-}
-
-/// Returns true if a misreading leaves more than noise, so that it explains the misfit in part only.
-fn is_partial(misread: &Finding) -> bool {
-    misread.remedy != FindingCode::Misread.entry().remedy
 }
 
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared

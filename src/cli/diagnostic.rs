@@ -6,8 +6,8 @@ use std::io::{IsTerminal as _, Write as _};
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
 use flexcal::error::{
-    InputError, InputErrorKind, Location, TableErrorKind, Warning, mask_hidden,
-    message_with_causes, mistake, one_line,
+    InputError, InputErrorKind, Location, TableErrorKind, mask_hidden, message_with_causes,
+    mistake, one_line,
 };
 use flexcal::fit::{Finding, FindingCode, Identification};
 use flexcal::report;
@@ -57,13 +57,6 @@ fn by_arguments(error: &DesignError) -> Option<String> {
         | DesignError::DeclaredEffect { .. }
         | DesignError::FollowsTime { .. } => Some(format!("--separate: {error}")),
         _ => None,
-    }
-}
-
-/// Prints warnings to standard error.
-pub fn print_warnings(warnings: &[Warning]) {
-    for warning in warnings {
-        show(Level::WARNING, &warning.to_string(), None);
     }
 }
 

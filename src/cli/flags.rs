@@ -67,9 +67,7 @@ impl Flags {
 
     /// Prints warnings unless the command is quiet.
     pub fn warn(&self, warnings: &[Warning]) {
-        if !self.quiet {
-            diagnostic::print_warnings(warnings);
-        }
+        self.hint(warnings.iter().map(ToString::to_string));
     }
 
     /// Returns the folder for the results of the problem or study with this `name`.

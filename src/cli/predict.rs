@@ -8,7 +8,7 @@ use flexcal::fit::{self, Residual};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::{HeldOut, Problem};
-use flexcal::remainder::{self, BoundTest, Bounds, CorrectedPrediction};
+use flexcal::remainder::{self, Bounds, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
 
@@ -109,7 +109,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
     let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
-    let test = bounds.and_then(|bounds| test_bounds(bounds, (&rows, residuals), &fitted));
+    let lengths = residuals.iter().enumerate().map(|(row, of)| (row, row, of.position.norm()));
+    let of_others = lengths.filter(|(row, ..)| fitted.binary_search(row).is_err());
+    let test = bounds.map(|bounds| bounds.test(&rows, of_others)).filter(|test| test.of > 0);
     let tested = bounds.map(|bounds| (bounds, test.as_ref()));
     let errors = prediction.errors.as_ref().map(|errors_of_rows| {
         let errors = PredictionErrors::new(errors_of_rows, &prediction.spreads);
@@ -174,16 +176,4 @@ fn common_error(rows: &Measurements, residuals: &[Residual]) -> Option<String> {
             mean.z * 1e3
         )
     })
-}
-
-/// Tests the bounds by the rows that are not among the `fitted` ones; `None` if no such row has an
-/// error and a bound.
-fn test_bounds(
-    bounds: &Bounds,
-    (rows, residuals): (&Measurements, &[Residual]),
-    fitted: &[usize],
-) -> Option<BoundTest> {
-    let errors = residuals.iter().enumerate().map(|(row, of)| (row, row, of.position.norm()));
-    let errors = errors.filter(|(row, ..)| fitted.binary_search(row).is_err());
-    Some(bounds.test(rows, errors)).filter(|test| test.of > 0)
 }

@@ -176,6 +176,9 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
     let (n, all) =
         (found.outliers.len(), rows_in(found, |errors| errors.identification) + known_distances);
     let point = |outlier: &Outlier| {
+        let from = |size: f64, source: &str| {
+            format!(" ({}, from {source})", size_of_kind(outlier.kind, size, 3))
+        };
         let note = if outlier.kind == "known distance" { " (known distance)" } else { "" };
         format!(
             "{}{note}: {}, {} × the typical scatter{}",
@@ -186,7 +189,8 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
                 Some(_) if includes_orientation(found, outlier.kind) => {
                     " of position and orientation together".to_owned()
                 }
-                Some(scatter) => scatter_size(outlier.kind, scatter),
+                Some(TypicalScatter::Median(size)) => from(size, "the median"),
+                Some(TypicalScatter::Declared(size)) => from(size, "the σ that the fit assumes"),
                 None => String::new(),
             }
         )
@@ -222,16 +226,6 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
 /// the typical scatter is no length.
 pub(super) fn includes_orientation(found: &Identification, kind: &str) -> bool {
     found.orientation.is_some() && kind == "position"
-}
-
-/// States the size of the typical scatter for rows of a kind, and its source: " (0.197 mm, from the
-/// median)".
-fn scatter_size(kind: &str, scatter: TypicalScatter) -> String {
-    let (size, source) = match scatter {
-        TypicalScatter::Median(size) => (size, "the median"),
-        TypicalScatter::Declared(size) => (size, "the σ that the fit assumes"),
-    };
-    format!(" ({}, from {source})", size_of_kind(kind, size, 3))
 }
 
 /// Names the influential rows and states the size of the residual without them; `None` if there are

@@ -51,7 +51,9 @@ impl Chance {
                 scale * distribution.inverse_cdf(1.0 - level)
             }
             Self::Fisher { distribution, of } => distribution.inverse_cdf(1.0 - level / of),
-            Self::AndersonDarling => anderson_darling_upper(level),
+            Self::AndersonDarling => {
+                bisect(|value| anderson_darling_p(value) > level, (0.0, MAX_STATISTIC), 60).1
+            }
             Self::Drawn(drawn) => drawn.upper(level),
         }
     }
@@ -143,9 +145,4 @@ fn anderson_darling_p(statistic: f64) -> f64 {
         _ if a < 0.6 => curve(0.9177, -4.279, -1.38),
         _ => curve(1.2937, -5.709, 0.0186),
     }
-}
-
-/// Returns the value of A² that is exceeded with probability `level` under normality, by bisection.
-fn anderson_darling_upper(level: f64) -> f64 {
-    bisect(|statistic| anderson_darling_p(statistic) > level, (0.0, MAX_STATISTIC), 60).1
 }

@@ -61,7 +61,7 @@ pub(super) fn fit(
 /// Another σ only scales the noise.
 fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
     let truth = study.truth.with_noise(cell.sigma);
-    let seed = repetition_seed(study, repetition);
+    let seed = stream(study.seed, repetition as u64).next_u64();
     let Draw { arm, parameters, mut rows } =
         rig::draw(&study.problem, &truth, study.held_out + cell.poses, seed);
     let strengths = Strengths::draw(study, seed);
@@ -89,11 +89,6 @@ fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
         identification: (study.held_out..rows.len()).collect(),
     };
     Some(Data { dataset: Dataset::new(table(&rows), split), truth: true_x })
-}
-
-/// Returns the seed of one repetition.
-fn repetition_seed(study: &Study, repetition: usize) -> u64 {
-    stream(study.seed, repetition as u64).next_u64()
 }
 
 /// Returns the position that the model predicts in each row for the true arm with the true effect

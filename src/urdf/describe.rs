@@ -228,11 +228,6 @@ fn number(value: f64) -> String {
     if rounded.is_finite() { (rounded + 0.0).to_string() } else { value.to_string() }
 }
 
-/// Formats a joint limit with at most six decimals.
-fn limit_number(value: f64) -> String {
-    number((value * 1e6).round() / 1e6)
-}
-
 /// Formats an angle \[rad\] in degrees between −180 and 180; right angles are written exactly.
 fn degrees(angle: f64) -> String {
     let within = angle - (angle / TAU).round() * TAU;
@@ -310,7 +305,8 @@ fn arm_toml(chain: &Chain, name: &str, rows: &[Row]) -> String {
             for (key, limit) in
                 [("min", min), ("max", max)].into_iter().filter(|(_, limit)| limit.is_finite())
             {
-                let _ = writeln!(text, "{key}_{unit} = {}", limit_number(limit * scale));
+                let rounded = (limit * scale * 1e6).round() / 1e6;
+                let _ = writeln!(text, "{key}_{unit} = {}", number(rounded));
             }
         }
         for (name, mass, com) in &row.bodies {

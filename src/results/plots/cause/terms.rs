@@ -29,12 +29,6 @@ impl EffectRows<'_> {
         others.iter().all(|site| site == first).then_some(*first)
     }
 
-    /// Returns true if no term has a constant regressor, so that the effect varies from pose to
-    /// pose.
-    pub fn is_driven(&self) -> bool {
-        self.terms.iter().all(|(regressor, _)| !regressor.is_constant())
-    }
-
     /// Returns the quantities on which the terms depend, without duplicates.
     pub fn quantities(&self) -> Vec<LawQuantity> {
         let mut found = Vec::new();

@@ -61,7 +61,9 @@ pub fn at_joint<'a>(
         (across, levers.iter().zip(&rows.displacements).map(moment).collect())
     };
     let (across, x, law): (_, _, Law) = match field {
-        JointField::Theta | JointField::D if rows.is_driven() => {
+        JointField::Theta | JointField::D
+            if rows.terms.iter().all(|(regressor, _)| !regressor.is_constant()) =>
+        {
             match (rows.quantities().as_slice(), rows.terms.as_slice()) {
                 (&[quantity], _) if rows.over_quantity(quantity, problem).is_some() => {
                     rows.over_quantity(quantity, problem)?
