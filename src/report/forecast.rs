@@ -3,6 +3,7 @@
 
 use super::document::{Block, Table};
 use crate::design::{ExpectedParameter, PairSeparation};
+use crate::numeric::whole;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::Display;
 use crate::quantity::format::{
@@ -63,9 +64,7 @@ pub(super) fn assumptions<'a>(
 /// problem holds a fraction of the poses out.
 pub(super) fn poses_to_measure(problem: &Problem, fitted: usize) -> Option<usize> {
     let Some(HeldOut::Fraction { fraction, .. }) = &problem.data.held_out else { return None };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of poses")]
-    let measured = (fitted as f64 / (1.0 - fraction) - 1e-9).ceil() as usize;
-    Some(measured)
+    Some(whole((fitted as f64 / (1.0 - fraction) - 1e-9).ceil()))
 }
 
 /// Formats a size \[SI\] in `unit` with two significant digits; a dash for `None`.

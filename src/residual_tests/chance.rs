@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma};
 
-use crate::numeric::bisect;
+use crate::numeric::{bisect, whole};
 
 /// Minimum number of draws that must reach a value for their fraction to estimate its probability.
 /// With fewer, the tail is that of a fitted gamma distribution.
@@ -121,12 +121,7 @@ impl Drawn {
         if level > self.share(MIN_EXCEEDING_DRAWS) {
             let reached = level * (1 + self.values.len()) as f64 - 1.0;
             // The bound is a drawn value, which a whole number of draws reaches.
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "between 0 and the draws"
-            )]
-            let reached = (reached.floor() as usize).clamp(1, self.values.len());
+            let reached = whole(reached).clamp(1, self.values.len());
             self.values[self.values.len() - reached]
         } else {
             self.origin + self.unit * self.tail.inverse_cdf(1.0 - level)

@@ -176,6 +176,11 @@ impl Robot {
         &self.source.file
     }
 
+    /// Returns the name of a link; empty for none.
+    pub(super) fn link_name(&self, link: usize) -> String {
+        self.links.get(link).map_or_else(String::new, |link| link.name.clone())
+    }
+
     /// Returns the index of the link with a name; an error if there is none.
     pub(super) fn link(&self, name: &str) -> Result<usize, InputError> {
         let unknown = || {
