@@ -138,7 +138,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             if common.quiet {
                 diagnostic::warn(&report::tolerance_text(tested));
             }
-            Ok(Outcome::NotPassed)
+            Ok(Outcome::NotMet)
         }
         _ => Ok(outcome),
     }

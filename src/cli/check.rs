@@ -81,7 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         return Ok(Outcome::Done);
     }
     diagnostic::warn(&report::why_not_sufficient(&check));
-    Ok(Outcome::NotTrusted)
+    Ok(Outcome::NotMet)
 }
 
 /// Returns the poses to check that the arguments name, drawn from ranges or read from tables.

@@ -87,7 +87,7 @@ pub fn report_fit_once(fit: &Identification, (quiet, prints_text): (bool, bool))
     }
     warn("the fit is not to be trusted, for the reason below");
     print_cautions(fit);
-    Outcome::NotTrusted
+    Outcome::NotMet
 }
 
 /// Prints the warnings of a fit, except the one that it is not trusted.

@@ -172,15 +172,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let words = fitted
         .as_ref()
         .filter(is_reported)
-        .map(|corrected| {
-            format!(
-                "\n{}\n",
-                textwrap::fill(
-                    &report::remainder_text(&identification, &corrected.outcome()),
-                    report::text_width()
-                )
-            )
-        })
+        .map(|corrected| report::remainder_paragraph(&identification, &corrected.outcome()))
         .unwrap_or_default();
     let mut shown = PlotData::of_identification(&problem, &data, &identification)?;
     if let Some(fitted) = &fitted {

@@ -156,7 +156,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     };
     match outcome {
         Ok(Outcome::Done) => 0,
-        Ok(Outcome::NotTrusted | Outcome::NotPassed | Outcome::Interrupted) => 1,
+        Ok(Outcome::NotMet) => 1,
         Ok(Outcome::Changed) => 3,
         Err(error) => {
             diagnostic::print(error.as_ref());

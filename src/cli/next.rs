@@ -195,18 +195,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let step = next_step(arguments, &problem, (&next, &options), &results);
         format!("{}{}Next: {step}\n", story.text(), results.written())
     })?;
-    if !next.found.is_trusted() {
+    let is_trusted = next.found.is_trusted();
+    if !is_trusted {
         diagnostic::warn(
             "the fit to the measured poses is not to be trusted: flexcal identify says why",
         );
-        return Ok(Outcome::NotTrusted);
     }
     let is_met = next.error.zip(options.tolerance).is_none_or(|(error, most)| error.bound <= most);
-    Ok(if next.stop == Some(StopReason::GainBelowNoise) && !is_met {
-        Outcome::NotPassed
-    } else {
-        Outcome::Done
-    })
+    let is_exhausted = next.stop == Some(StopReason::GainBelowNoise) && !is_met;
+    Ok(Outcome::from_trust(is_trusted && !is_exhausted))
 }
 
 /// States what to do after the choice of poses, with the commands.

@@ -145,7 +145,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         return Ok(Outcome::Done);
     }
     diagnostic::warn("the plan does not determine all parameters without a prior: plan more poses");
-    Ok(Outcome::NotTrusted)
+    Ok(Outcome::NotMet)
 }
 
 /// Returns the columns that the measurements in `files` have and a table of planned poses lacks. All

@@ -55,6 +55,7 @@ pub(crate) use noise::influential_rows_advice;
 pub(crate) use predict::prediction;
 #[doc(hidden)]
 pub use remainder::PredictionAccuracy;
+pub(crate) use remainder::remainder_paragraph;
 pub use render::Report;
 #[doc(hidden)]
 pub use render::{Story, limit_text_width, text_width};
