@@ -77,12 +77,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
     }
     common.warn_of_loads(&problem, &estimate, &rows);
-    for session in estimate.unknown_sessions(&rows).into_iter().filter(|_| !common.quiet) {
-        diagnostic::warn(&format!(
+    common.hint(estimate.unknown_sessions(&rows).into_iter().map(|session| {
+        format!(
             "the estimate does not know session {session}: its base is fitted to these rows, so that a base or an instrument that has moved \
              cannot be seen; if it stands where it stood, give the rows the session of the estimate"
-        ));
-    }
+        )
+    }));
     let settings = (arguments.drift, arguments.false_alarms);
     let rows = rows.arm_rows();
     let watch = life::watch(&problem, &estimate, &rows, settings)?;
