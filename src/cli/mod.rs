@@ -31,7 +31,6 @@ mod plan;
 mod poses;
 mod predict;
 mod progress;
-mod region;
 mod simulate;
 mod study;
 mod threads;

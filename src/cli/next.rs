@@ -16,9 +16,8 @@ use flexcal::results::{Document as _, NextResult, poses_csv};
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::Results;
-use super::poses::Source;
+use super::poses::{Region, Source};
 use super::progress::Line;
-use super::region::Region;
 use super::{diagnostic, interrupt, values};
 
 /// Arguments of `flexcal next`.

@@ -12,9 +12,8 @@ use flexcal::results::{Document as _, PlanResult, poses_csv};
 
 use super::input::Common;
 use super::outcome::Outcome;
-use super::poses::Source;
+use super::poses::{Region, Source};
 use super::progress::Line;
-use super::region::Region;
 use super::{diagnostic, values};
 
 /// Arguments of `flexcal plan`.

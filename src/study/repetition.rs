@@ -8,9 +8,7 @@ use rand::Rng as _;
 use super::definition::{Cell, Source, Study};
 use super::effects::Strengths;
 use super::tally::{Fitted, ParameterScore, Score};
-use crate::fit::{
-    Estimate, FindingCode, Identification, IdentifyError, Options, Placement, identify,
-};
+use crate::fit::{FindingCode, Identification, IdentifyError, Options, Placement, identify};
 use crate::measurement::{Dataset, Labels, Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
@@ -184,7 +182,11 @@ fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
     };
     let parameters = study.parameters.iter().zip(&data.truth).map(|(parameter, truth)| {
         let (x, std_error) = match estimate(&parameter.name) {
-            Some((estimate, x)) => (*x, deviation_error(estimate)),
+            Some((estimate, x)) => {
+                // The deviation of a stiffness is a logarithm.
+                let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
+                (*x, estimate.std_error.map(|error| error / scale))
+            }
             None => (0.0, None),
         };
         truth.map(|truth| ParameterScore { error: x - truth, std_error })
@@ -196,11 +198,4 @@ fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
         iterations: identification.iterations,
         parameters: parameters.collect(),
     })
-}
-
-/// Returns the standard error of the deviation x of an estimate, a logarithm for stiffnesses;
-/// `None` if the fit reports none.
-fn deviation_error(estimate: &Estimate) -> Option<f64> {
-    let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
-    estimate.std_error.map(|error| error / scale)
 }

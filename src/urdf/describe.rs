@@ -11,7 +11,7 @@ use super::free::distinguishable_parameters;
 use super::lines::Step;
 use super::notes;
 use super::read::Kind;
-use crate::error::InputError;
+use crate::error::{InputError, UrdfErrorKind};
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
 use crate::problem::{Problem, quoted};
 use crate::spatial::Frame;
@@ -87,8 +87,12 @@ pub(crate) fn describe_measured(
     let name = name(&chain.robot.name);
     let arm = arm_toml(chain, &name, &rows);
     // Only numbers of excessive size cause an error here.
-    let problem = Problem::parse(&arm, Path::new("problem.toml"))
-        .map_err(|error| chain.robot.as_problem(&error))?;
+    let problem = Problem::parse(&arm, Path::new("problem.toml")).map_err(
+        |InputError { location, kind }| {
+            let key = location.key.unwrap_or_default();
+            chain.robot.error(UrdfErrorKind::AsProblem { key, why: kind.to_string() })
+        },
+    )?;
     let free = distinguishable_parameters(&problem, board.is_some())?;
     notes.extend(notes::of_chain(chain));
     let view = board.map_or_else(|| TOOL.to_owned(), |(corners, distance)| view(corners, distance));
