@@ -72,7 +72,7 @@ impl Check {
 
     /// What the command line prints.
     fn summary(&self) -> String {
-        report::check_text(&self.problem, &self.check)
+        report::check(&self.problem, &self.check).text()
     }
 
     /// Why the poses do not suffice, if they do not.
@@ -92,7 +92,7 @@ impl Plan {
 
     /// What the command line prints.
     fn summary(&self) -> String {
-        report::plan_text(&self.problem, self.reached(), &self.found, self.separated.as_ref())
+        report::plan(&self.problem, self.reached(), &self.found, self.separated.as_ref()).text()
     }
 
     /// plan.csv.
@@ -324,7 +324,7 @@ pub fn next(
         let next = design::next(&declared, &data, &candidates, &options)?;
         Ok::<_, design::NextError>(Next {
             json: NextResult::new(&declared, &options, &next).to_json(),
-            summary: report::next_text(&declared, &options, &next),
+            summary: report::next(&declared, &options, &next).text(),
             csv: poses_csv(&declared, &next.poses),
         })
     })?;

@@ -399,7 +399,7 @@ impl Trace {
 
     /// What the command line prints.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
-        detached(py, || report::trace_text(&self.problem, &self.found))
+        detached(py, || report::trace(&self.problem, &self.found, None).text())
     }
 
     /// The fit of the declared problem.

@@ -97,7 +97,7 @@ impl Study {
 
     /// Returns the table that the command line prints.
     fn summary(&self) -> String {
-        report::study_text(&self.study, &self.found)
+        report::study(&self.study, &self.found).text()
     }
 
     /// Returns study.csv.

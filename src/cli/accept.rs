@@ -11,11 +11,10 @@ use flexcal::remainder::{self, Bounds};
 use flexcal::report;
 use flexcal::results::{AcceptanceRecord, AcceptanceResult, Document as _};
 
-use super::diagnostic;
-use super::git;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::progress::Line;
+use super::{diagnostic, git, values};
 
 /// Arguments of `flexcal accept`.
 #[derive(Debug, Args)]
@@ -35,14 +34,14 @@ pub struct Arguments {
     instrument: Option<String>,
     /// Largest error that a pose may have [mm]; the arm passes if the share of poses within it is
     /// large enough
-    #[arg(long, value_name = "MM", value_parser = parse_length)]
+    #[arg(long, value_name = "MM", value_parser = values::number(|mm| mm > 0.0, "a length in mm greater than 0 is needed, such as 0.2"))]
     tolerance_mm: Option<f64>,
     /// Share of all poses that must be within the tolerance
-    #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = super::remainder::parse_level, requires = "tolerance_mm")]
+    #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = values::level, requires = "tolerance_mm")]
     share: f64,
     /// Largest probability of a wrong verdict: a pass although fewer poses are within the
     /// tolerance, or a fail although enough are
-    #[arg(long, value_name = "P", default_value_t = 0.05, value_parser = super::remainder::parse_level, requires = "tolerance_mm")]
+    #[arg(long, value_name = "P", default_value_t = 0.05, value_parser = values::level, requires = "tolerance_mm")]
     risk: f64,
     /// Correct predictions by a smooth remainder that no law explains, if it improves predictions
     /// of poses left out of the fit
@@ -52,12 +51,6 @@ pub struct Arguments {
 
 /// Probability with which an error bound of the record holds.
 const CONFIDENCE_LEVEL: f64 = 0.95;
-
-/// Parses a length in mm, greater than 0.
-fn parse_length(text: &str) -> Result<f64, String> {
-    let length = text.parse::<f64>().ok().filter(|length| *length > 0.0 && length.is_finite());
-    length.ok_or_else(|| "a length in mm greater than 0 is needed, such as 0.2".to_owned())
-}
 
 /// Identifies the arm, judges its accuracy in the held-out poses, and writes the record and the
 /// page.
@@ -108,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let covered = (bounds.coverage(errors), rows, test);
         result = result.with_bounds(&bounds, covered, has_remainder);
     }
-    super::tolerance::warn_if_tiny(arguments.tolerance_mm, common.quiet);
+    common.warn_if_tiny(arguments.tolerance_mm);
     let tolerance = arguments.tolerance_mm.map(|length| Tolerance {
         length: length * 1e-3,
         share: arguments.share,
@@ -145,7 +138,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             if common.quiet {
                 diagnostic::warn(&report::tolerance_text(tested));
             }
-            Ok(Outcome::NotPassed)
+            Ok(Outcome::NotMet)
         }
         _ => Ok(outcome),
     }

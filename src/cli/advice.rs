@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexcal::fit::{Finding, FindingCode, Identification, SavedEstimate, Strategy};
+use flexcal::fit::{FindingCode, Identification, SavedEstimate, Strategy};
 use flexcal::problem::{Fixture, PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
@@ -39,6 +39,7 @@ pub fn after_fit(
     estimate: &Path,
 ) -> String {
     let named = common.problem_arguments();
+    let file = common.problem_file().display().to_string();
     let to_apply = |what: &str| {
         if measures_no_position(problem) {
             return to_export(common, problem, estimate);
@@ -67,27 +68,28 @@ pub fn after_fit(
             "follow the warning on the row from which on something changed, then flexcal \
              identify {named}"
         ),
-        Some(look) => {
-            format!("{look}; if they are right, {search}")
+        Some(look) => format!("{look}; if they are right, {search}"),
+        // A misreading with another remedy leaves more than noise, so that it explains a part only.
+        None if found
+            .finding(FindingCode::Misread)
+            .is_some_and(|misread| misread.remedy != FindingCode::Misread.entry().remedy) =>
+        {
+            format!(
+                "check what the warning names, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
+            )
         }
-        None if found.finding(FindingCode::Misread).is_some_and(is_partial) => format!(
-            "check what the warning names, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
-        ),
         None if found.has(FindingCode::Misread) => format!(
-            "correct the table or {} as the warning says, then flexcal identify {named}",
-            common.problem_file().display()
+            "correct the table or {file} as the warning says, then flexcal identify {named}"
         ),
         None if found.has(FindingCode::LensContradicted) => format!(
-            "free the intrinsics in [parameters] of {} as the warning says, then flexcal \
-             identify {named}",
-            common.problem_file().display()
+            "free the intrinsics in [parameters] of {file} as the warning says, then flexcal \
+             identify {named}"
         ),
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
         None if found.has(FindingCode::LimitContradicted) => format!(
-            "check the limits in {} that the warning names, then flexcal identify {named}",
-            common.problem_file().display()
+            "check the limits in {file} that the warning names, then flexcal identify {named}"
         ),
         // If a prior contradicts the data, neither a cause nor a correction follows from the fit.
         // If the nominal arm is far off, its declared numbers are wrong, not the priors.
@@ -97,15 +99,13 @@ pub fn after_fit(
             let rule = found
                 .finding(FindingCode::PriorContradicted)
                 .and_then(|finding| finding.word("rule"));
+            let rule = rule.unwrap_or_default();
             format!(
-                "give \"{}\" in {} a larger σ, or check the nominal values of these parameters and their units",
-                rule.unwrap_or_default(),
-                common.problem_file().display()
+                "give \"{rule}\" in {file} a larger σ, or check the nominal values of these parameters and their units"
             )
         }
         None if INPUT_MISTAKES.iter().any(|code| found.has(*code)) => format!(
-            "correct the table or {} as the warning says, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks",
-            common.problem_file().display()
+            "correct the table or {file} as the warning says, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
         ),
         None if found.has(FindingCode::NoiseBeyondDeclared) => search,
         None if !found.is_trusted() || report::determines_nothing(found) => {
@@ -127,23 +127,16 @@ pub fn after_fit(
         None if found.has(FindingCode::HeldOutOutliers) => {
             format!("check the held-out rows that the warning names; if they are right, {search}")
         }
-        None if found.finding(FindingCode::NarrowPoses).is_some_and(are_alike) => {
+        None if found
+            .finding(FindingCode::NarrowPoses)
+            .is_some_and(|narrow| narrow.value("alike").is_some_and(|alike| alike == true)) =>
+        {
             format!(
                 "flexcal plan {named} --poses N chooses poses over the whole range of the joints"
             )
         }
         None => to_apply("corrects commands"),
     }
-}
-
-/// Returns true if all fitted poses are alike, not only the values of some joints.
-fn are_alike(narrow: &Finding) -> bool {
-    narrow.value("alike").is_some_and(|alike| alike == true)
-}
-
-/// Returns true if a misreading leaves more than noise, so that it explains the misfit in part only.
-fn is_partial(misread: &Finding) -> bool {
-    misread.remedy != FindingCode::Misread.entry().remedy
 }
 
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared
@@ -156,6 +149,7 @@ pub fn after_loop(
     results: &Results,
 ) -> String {
     let named = common.problem_arguments();
+    let file = common.problem_file().display().to_string();
     if let Some(look) = report::influential_rows_advice(fit, &common.problem_file()) {
         return look;
     }
@@ -166,10 +160,7 @@ pub fn after_loop(
         return format!("flexcal identify {named} -v, once the input is corrected");
     }
     if report::lacks_masses(result) {
-        return format!(
-            "declare the masses in {}, then flexcal loop {named}",
-            common.problem_file().display()
-        );
+        return format!("declare the masses in {file}, then flexcal loop {named}");
     }
     if result.structures().any(|left| left.limit.is_some()) {
         return format!(

@@ -10,10 +10,10 @@ use flexcal::problem::Problem;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{CheckResult, Document as _};
 
-use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::poses::{Source, parse_count};
+use super::poses::Source;
+use super::{diagnostic, values};
 
 /// Arguments of `flexcal check`.
 #[derive(Debug, Args)]
@@ -30,7 +30,7 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to draw
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::count::<10_000>)]
     poses: Option<u32>,
     #[command(flatten)]
     source: Source,
@@ -63,8 +63,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let check =
         design::check(&problem, &checked_poses(arguments, &problem)?, arguments.source.seed)?;
     let json = CheckResult::new(&problem, &check).to_json();
-    let page = report::check_page(&problem, &check);
-    results.write(&[("check.json", &json), ("check.html", &page)])?;
+    let story = report::check(&problem, &check);
+    results.write(&[("check.json", &json), ("check.html", &story.page())])?;
     common.print_result(&json, || {
         let problem_word = shell_word(common.problem());
         let is_measured = arguments.poses.is_none() && arguments.source.candidates.is_empty();
@@ -75,14 +75,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             format!("flexcal plan {problem_word} --poses N chooses poses that tell more")
         };
-        let text = report::check_text(&problem, &check);
-        format!("{text}{}Next: {next}\n", results.written())
+        format!("{}{}Next: {next}\n", story.text(), results.written())
     })?;
     if check.suffices() {
         return Ok(Outcome::Done);
     }
     diagnostic::warn(&report::why_not_sufficient(&check));
-    Ok(Outcome::NotTrusted)
+    Ok(Outcome::NotMet)
 }
 
 /// Returns the poses to check that the arguments name, drawn from ranges or read from tables.

@@ -62,12 +62,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !quiet && sides[0].estimate.problem_name() != sides[1].estimate.problem_name() {
         diagnostic::warn("the two results are of problems with different names");
     }
-    results.write(&[(PAGE_FILE, &report::difference_page(&sides))])?;
+    let story = report::difference(&sides);
+    results.write(&[(PAGE_FILE, &story.page())])?;
     if !quiet {
         let better = shell_word(if report::predicts_better(&sides) { second } else { first });
         output::print(&format!(
             "{}{}Next: flexcal watch PROBLEM --estimate {better} --data FILE says whether new rows contradict an estimate\n",
-            report::difference_text(&sides),
+            story.text(),
             results.written()
         ))?;
     }

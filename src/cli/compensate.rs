@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flexcal::error::{InputError, InputErrorKind, TableErrorKind};
 use flexcal::fit;
 use flexcal::measurement::Measurements;
@@ -15,7 +15,7 @@ use flexcal::results::{CompensationResult, Document as _, commands_csv};
 use super::estimate::Trust;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::{advice, diagnostic};
+use super::{advice, diagnostic, values};
 
 /// Arguments of `flexcal compensate`.
 #[derive(Debug, Args)]
@@ -35,40 +35,25 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
     /// The frame in which targets are given
-    #[arg(long, value_enum, default_value_t = Frame::Measuring)]
-    frame: Frame,
+    #[arg(long, default_value = FRAMES[0].0, value_parser = values::one_of(FRAMES))]
+    frame: TargetFrame,
     /// Probability with which the bound of an error holds
-    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::parse_level)]
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = values::level)]
     level: f64,
     #[command(flatten)]
     trust: Trust,
 }
 
-/// Frame in which the targets are given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Frame {
-    /// The measuring frame, as for measurements
-    Measuring,
-    /// The frame of the arm's base
-    Base,
-}
-
-impl From<Frame> for TargetFrame {
-    fn from(frame: Frame) -> Self {
-        match frame {
-            Frame::Measuring => Self::Measuring,
-            Frame::Base => Self::Base,
-        }
-    }
-}
+/// Frames in which the targets may be given, each with its name and a summary.
+const FRAMES: [(&str, &str, TargetFrame); 2] = [
+    ("measuring", "The measuring frame, as for measurements", TargetFrame::Measuring),
+    ("base", "The frame of the arm's base", TargetFrame::Base),
+];
 
 /// Returns the option that chooses a frame.
 fn frame_option(frame: TargetFrame) -> String {
-    let name = match frame {
-        TargetFrame::Measuring => "measuring",
-        TargetFrame::Base => "base",
-    };
-    format!("--frame {name}")
+    let chosen = FRAMES.iter().find(|(.., other)| *other == frame);
+    chosen.map_or_else(String::new, |(name, ..)| format!("--frame {name}"))
 }
 
 /// Error of missing targets: no table of targets is named.
@@ -106,10 +91,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (targets, warnings) =
         Measurements::read_poses(common.data(), &problem).map_err(with_start)?;
     common.warn(&warnings);
-    for missing in fit::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet)
-    {
-        diagnostic::warn(&format!("{missing}; the commands neglect the effects that depend on it"));
-    }
+    let missing = fit::missing_target_columns(&problem, &targets);
+    common.hint(
+        missing.iter().map(|missing| {
+            format!("{missing}; the commands neglect the effects that depend on it")
+        }),
+    );
     let estimate = arguments.trust.read(&arguments.estimate)?;
     let trusted = estimate.trusted;
     common.warn_of_loads(&problem, &estimate, &targets);
@@ -123,7 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let solve = |targets: Measurements, frame: TargetFrame| {
         Compensation::new(&problem, fitted, targets, frame, arguments.level)
     };
-    let frame = arguments.frame.into();
+    let frame = arguments.frame;
     let found = solve(targets.clone(), frame)?;
     let as_given = (&targets, frame, found.commands.as_slice());
     let Doubts { misplaced, others } =
@@ -133,18 +120,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // An error of the remainder's file is reported only after errors of the estimate, which explain
     // more.
     correction?;
-    if found.is_base_open && !common.quiet {
-        diagnostic::warn(
+    if found.is_base_open {
+        common.hint([
             "the estimate does not know where the arm's base is in the measuring frame, so targets in that frame are reached as far as it \
              happens to be assumed; --frame base takes them in the frame of the base",
-        );
+        ]);
     }
     // Beside an estimate that is not to be trusted, its misfit explains targets that seem misplaced.
-    if let Some(words) = misplaced.as_ref().filter(|_| !common.quiet && trusted) {
-        diagnostic::warn(words);
+    if trusted {
+        common.hint(misplaced.iter().chain(&others));
     }
     let Compensation { targets, commands, bounds, .. } = &found;
-    others.iter().filter(|_| !common.quiet && trusted).for_each(|words| diagnostic::warn(words));
     let bounds = bounds.as_ref();
     let table = commands_csv(&problem, targets, commands, bounds);
     results.write(&[("commands.csv", &table)])?;

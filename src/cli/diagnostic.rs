@@ -6,8 +6,8 @@ use std::io::{IsTerminal as _, Write as _};
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
 use flexcal::error::{
-    InputError, InputErrorKind, Location, TableErrorKind, Warning, mask_hidden,
-    message_with_causes, mistake, one_line,
+    InputError, InputErrorKind, Location, TableErrorKind, mask_hidden, message_with_causes,
+    mistake, one_line,
 };
 use flexcal::fit::{Finding, FindingCode, Identification};
 use flexcal::report;
@@ -60,13 +60,6 @@ fn by_arguments(error: &DesignError) -> Option<String> {
     }
 }
 
-/// Prints warnings to standard error.
-pub fn print_warnings(warnings: &[Warning]) {
-    for warning in warnings {
-        show(Level::WARNING, &warning.to_string(), None);
-    }
-}
-
 /// Prints a warning to standard error.
 pub fn warn(message: &str) {
     show(Level::WARNING, message, None);
@@ -94,7 +87,7 @@ pub fn report_fit_once(fit: &Identification, (quiet, prints_text): (bool, bool))
     }
     warn("the fit is not to be trusted, for the reason below");
     print_cautions(fit);
-    Outcome::NotTrusted
+    Outcome::NotMet
 }
 
 /// Prints the warnings of a fit, except the one that it is not trusted.

@@ -19,12 +19,11 @@ use flexcal::urdf::{
     Chain, MovedOrigin, Robot, YamlFormat, export_with_links, joint_origins, mounted_links, yaml,
 };
 
-use super::diagnostic;
 use super::estimate::Trust;
 use super::flags::{Flags, file_in};
 use super::outcome::Outcome;
 use super::output::Results;
-use super::region::parse_numbers;
+use super::{diagnostic, values};
 
 /// Arguments of `flexcal export`.
 #[derive(Debug, Args)]
@@ -67,7 +66,7 @@ pub struct Arguments {
     #[arg(long)]
     fitted_alone: bool,
     /// Box of the target in which --best-rigid fits, frame of the arm's base
-    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = parse_numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
+    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = values::numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
     workspace_mm: Option<[f64; 6]>,
     /// Number of poses in the test program of --format c
     #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]
@@ -200,14 +199,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let file = file_in(&arguments.problem, "problem.toml");
     let inputs = [&[file, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
     let results = Results::claim("export", folder, inputs, &[&name], (flags.force, flags.quiet))?;
-    if let Some(absent) =
-        files.iter().find(|file| !file.is_file()).filter(|_| !has_files && !flags.quiet)
-    {
-        diagnostic::warn(&format!(
-            "no errors are computed, because {} does not exist",
-            absent.display()
-        ));
-    }
+    let absent = files.iter().find(|file| !file.is_file()).filter(|_| !has_files);
+    flags.hint(absent.map(|absent| {
+        format!("no errors are computed, because {} does not exist", absent.display())
+    }));
     let errors = match &data {
         Some(data) => {
             // Bases and targets are those that occur in the data, perhaps fewer than in the fit.

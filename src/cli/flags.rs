@@ -8,6 +8,9 @@ use flexcal::error::Warning;
 use super::diagnostic;
 use super::output::{self, Results, WriteError};
 
+/// Smallest tolerance that is plausible \[mm\]: arms repeat to some hundredths of a millimetre.
+const MIN_TOLERANCE_MM: f64 = 1e-3;
+
 /// Arguments for the folder of the results and the format of the output.
 #[derive(Debug, Clone, Args)]
 pub struct Flags {
@@ -46,11 +49,25 @@ impl Flags {
         }
     }
 
+    /// Prints a warning for each of some texts unless the command is quiet.
+    pub fn hint(&self, words: impl IntoIterator<Item = impl AsRef<str>>) {
+        words.into_iter().filter(|_| !self.quiet).for_each(|text| diagnostic::warn(text.as_ref()));
+    }
+
+    /// Warns of a tolerance \[mm\] that is too small for an arm, as one in metres is.
+    pub fn warn_if_tiny(&self, tolerance_mm: Option<f64>) {
+        self.hint(tolerance_mm.filter(|mm| *mm < MIN_TOLERANCE_MM).map(|tolerance| {
+            format!(
+                "a tolerance of {tolerance} mm is below what an arm holds; if it is in metres, \
+                 write --tolerance-mm {}",
+                (tolerance * 1e9).round() / 1e6
+            )
+        }));
+    }
+
     /// Prints warnings unless the command is quiet.
     pub fn warn(&self, warnings: &[Warning]) {
-        if !self.quiet {
-            diagnostic::print_warnings(warnings);
-        }
+        self.hint(warnings.iter().map(ToString::to_string));
     }
 
     /// Returns the folder for the results of the problem or study with this `name`.

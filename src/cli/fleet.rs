@@ -57,11 +57,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         ));
     }
     let fleet = life::fleet(&read)?;
-    results.write(&[(&name, &fleet.to_toml()), (&page, &report::fleet_page(&fleet))])?;
+    let story = report::fleet(&fleet);
+    results.write(&[(&name, &fleet.to_toml()), (&page, &story.page())])?;
     if *json {
         output::print_json(&FleetResult::new(&fleet).to_json())?;
     } else if !quiet {
-        let text = report::fleet_text(&fleet);
+        let text = story.text();
         let prior = shell_word(out);
         let next = format!(
             "flexcal identify PROBLEM --prior {prior} takes them as the prior of the next arm"

@@ -5,7 +5,6 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
 use flexcal::life::{FleetPrior, PriorError, PriorSource, Update, update};
 use flexcal::measurement::Dataset;
@@ -21,7 +20,7 @@ use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
-use super::{advice, diagnostic, interrupt};
+use super::{advice, diagnostic, interrupt, values};
 
 /// Smallest number of new poses of which some may be held out without a warning.
 const MANY_POSES: usize = 20;
@@ -36,10 +35,10 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Parameters that are fitted together
-    #[arg(long, default_value = Strategy::Joint.as_str(), value_parser = words(&Strategy::EACH, Strategy::as_str, Strategy::summary))]
+    #[arg(long, default_value = Strategy::Joint.as_str(), value_parser = values::one_of(Strategy::EACH.map(|each| (each.as_str(), each.summary(), each))))]
     strategy: Strategy,
     /// Solver; auto keeps bounds and constraints if there are any
-    #[arg(long, default_value = SolverChoice::Auto.as_str(), value_parser = words(SolverChoice::CHOICES, SolverChoice::as_str, SolverChoice::summary))]
+    #[arg(long, default_value = SolverChoice::Auto.as_str(), value_parser = values::one_of(solvers()))]
     solver: SolverChoice,
     /// Correct predictions by a smooth remainder that no law explains, if it improves predictions
     /// of poses left out of the fit; writes remainder.json
@@ -50,7 +49,7 @@ pub struct Arguments {
     #[arg(long, value_name = "ESTIMATE.json|PRIOR.toml", conflicts_with = "remainder")]
     prior: Option<PathBuf>,
     /// Days since the earlier identification, by whose drift the prior is widened
-    #[arg(long, value_name = "DAYS", default_value_t = 0.0, requires = "prior", value_parser = parse_days)]
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0, requires = "prior", value_parser = values::days)]
     drift: f64,
     #[command(flatten)]
     trust: Trust,
@@ -59,26 +58,9 @@ pub struct Arguments {
     verbose: bool,
 }
 
-/// Returns the parser of an argument whose words are the names of the values `each`. In the help,
-/// `summary` describes each value.
-fn words<T: Copy + Send + Sync + 'static>(
-    each: &'static [T],
-    name: fn(T) -> &'static str,
-    summary: fn(T) -> &'static str,
-) -> impl TypedValueParser<Value = T> {
-    let values = each.iter().map(|&value| PossibleValue::new(name(value)).help(summary(value)));
-    PossibleValuesParser::new(values).try_map(move |word| {
-        each.iter()
-            .copied()
-            .find(|&value| name(value) == word)
-            .ok_or_else(|| format!("{word} stands for nothing"))
-    })
-}
-
-/// Parses a number of days, at least 0.
-pub(super) fn parse_days(text: &str) -> Result<f64, String> {
-    let days = text.parse::<f64>().ok().filter(|days| days.is_finite() && *days >= 0.0);
-    days.ok_or_else(|| "a number of days, at least 0, is expected".to_owned())
+/// Returns the solvers with their names and summaries.
+fn solvers() -> Vec<(&'static str, &'static str, SolverChoice)> {
+    SolverChoice::CHOICES.iter().map(|each| (each.as_str(), each.summary(), *each)).collect()
 }
 
 /// Prints a warning if few new rows are fitted with a prior and some of them are held out.
@@ -190,15 +172,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let words = fitted
         .as_ref()
         .filter(is_reported)
-        .map(|corrected| {
-            format!(
-                "\n{}\n",
-                textwrap::fill(
-                    &report::remainder_text(&identification, &corrected.outcome()),
-                    report::text_width()
-                )
-            )
-        })
+        .map(|corrected| report::remainder_paragraph(&identification, &corrected.outcome()))
         .unwrap_or_default();
     let mut shown = PlotData::of_identification(&problem, &data, &identification)?;
     if let Some(fitted) = &fitted {

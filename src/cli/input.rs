@@ -116,7 +116,7 @@ impl Common {
     /// Warns if `rows` lack a load that the rows of an estimate had.
     pub fn warn_of_loads(&self, problem: &Problem, estimate: &SavedEstimate, rows: &Measurements) {
         let missing = fit::missing_loads(problem, estimate, rows);
-        missing.iter().filter(|_| !self.quiet).for_each(|words| diagnostic::warn(words));
+        self.hint(missing);
     }
 
     /// Prints a warning if no parameter of the arm is free, unless the command is quiet.

@@ -88,13 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     ];
     texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
     let words = kept.and(fitted.as_ref()).map_or_else(String::new, |corrected| {
-        format!(
-            "\n{}\n",
-            textwrap::fill(
-                &report::remainder_text(&closure.after, &corrected.outcome()),
-                report::text_width()
-            )
-        )
+        report::remainder_paragraph(&closure.after, &corrected.outcome())
     });
     let told = report::loop_report(&problem, &closure, &shown);
     interrupt::begin_writing();
@@ -113,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let next = advice::after_loop(common, &problem, &closure.before.fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())
     })?;
-    Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
+    Ok(if closure.interrupted { Outcome::NotMet } else { outcome })
 }
 
 /// Fits a remainder in addition to the effects of the extended problem, whose text is `closed`.

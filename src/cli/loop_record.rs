@@ -84,7 +84,12 @@ impl LoopRecord {
     pub fn files_relative_to(&self, folder: &Path) -> Result<[Vec<PathBuf>; 2], WriteError> {
         let of = |files: &[PathBuf]| -> io::Result<Vec<PathBuf>> {
             fs::create_dir_all(folder)?;
-            files.iter().map(|file| relative_path(folder, file)).collect()
+            let folder = folder.canonicalize()?;
+            let relative = |file: &PathBuf| {
+                let file = file.canonicalize()?;
+                Ok(pathdiff::diff_paths(&file, &folder).unwrap_or(file))
+            };
+            files.iter().map(relative).collect()
         };
         let [files, joint_files] = &self.files;
         let failed = |source| WriteError::Io { path: folder.to_owned(), source };
@@ -140,10 +145,4 @@ fn is_finished(file: &Path) -> bool {
     let result: Option<Value> =
         fs::read_to_string(file).ok().and_then(|text| serde_json::from_str(&text).ok());
     result.is_some_and(|result| result.get("interrupted") != Some(&Value::Bool(true)))
-}
-
-/// Returns the path of a file relative to a folder, or its absolute path if no relative one exists.
-fn relative_path(folder: &Path, file: &Path) -> io::Result<PathBuf> {
-    let (folder, file) = (folder.canonicalize()?, file.canonicalize()?);
-    Ok(pathdiff::diff_paths(&file, folder).unwrap_or(file))
 }

@@ -31,13 +31,11 @@ mod plan;
 mod poses;
 mod predict;
 mod progress;
-mod region;
-mod remainder;
 mod simulate;
 mod study;
 mod threads;
-mod tolerance;
 mod trace;
+mod values;
 mod watch;
 
 use std::ffi::OsString;
@@ -157,7 +155,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     };
     match outcome {
         Ok(Outcome::Done) => 0,
-        Ok(Outcome::NotTrusted | Outcome::NotPassed | Outcome::Interrupted) => 1,
+        Ok(Outcome::NotMet) => 1,
         Ok(Outcome::Changed) => 3,
         Err(error) => {
             diagnostic::print(error.as_ref());

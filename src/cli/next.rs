@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flexcal::design::{
     self, Candidates, Explanations, NextOptions, NextPoses, Purpose, StopReason,
 };
@@ -16,10 +16,9 @@ use flexcal::results::{Document as _, NextResult, poses_csv};
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::Results;
-use super::poses::{Source, parse_count};
+use super::poses::{Region, Source};
 use super::progress::Line;
-use super::region::Region;
-use super::{diagnostic, interrupt};
+use super::{diagnostic, interrupt, values};
 
 /// Arguments of `flexcal next`.
 #[derive(Debug, Args)]
@@ -41,20 +40,20 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to choose
-    #[arg(long, value_name = "K", default_value_t = DEFAULT_POSES, allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
+    #[arg(long, value_name = "K", default_value_t = DEFAULT_POSES, allow_negative_numbers = true, value_parser = values::count::<10_000>)]
     poses: u32,
     /// Say "enough" once errors in the workspace are below this, with the probability of --level
-    #[arg(long, value_name = "MM", value_parser = parse_positive)]
+    #[arg(long, value_name = "MM", value_parser = values::number(|mm| mm > 0.0, "a positive number is needed"))]
     tolerance_mm: Option<f64>,
     /// Aim of the poses
-    #[arg(long = "for", value_enum, default_value_t = PurposeArgument::Accuracy)]
-    purpose: PurposeArgument,
+    #[arg(long = "for", default_value = PURPOSES[0].0, value_parser = values::one_of(PURPOSES))]
+    purpose: Purpose,
     /// The loop.json with the explanations to tell apart [default: the one in the folder of
     /// results]
     #[arg(long, value_name = "LOOP.json")]
     explanations: Option<PathBuf>,
     /// Probability with which errors stay below the bound
-    #[arg(long, value_name = "P", default_value_t = DEFAULT_LEVEL, value_parser = super::remainder::parse_level)]
+    #[arg(long, value_name = "P", default_value_t = DEFAULT_LEVEL, value_parser = values::level)]
     level: f64,
     /// Judge predictions with a remainder fitted to the measured poses, as identify --remainder
     /// makes them
@@ -75,11 +74,8 @@ impl Arguments {
             words.push(format!("--poses {}", self.poses));
         }
         words.extend(self.tolerance_mm.map(|most| format!("--tolerance-mm {most}")));
-        if let Some(aim) = self.purpose.to_possible_value()
-            && self.purpose != PurposeArgument::Accuracy
-        {
-            words.push(format!("--for {}", aim.get_name()));
-        }
+        let aim = PURPOSES.iter().skip(1).find(|(.., purpose)| *purpose == self.purpose);
+        words.extend(aim.map(|(name, ..)| format!("--for {name}")));
         let path = |flag: &str, file: &PathBuf| format!("{flag} {}", shell_word(file));
         words.extend(self.explanations.iter().map(|file| path("--explanations", file)));
         if (self.level - DEFAULT_LEVEL).abs() > 0.0 {
@@ -98,31 +94,12 @@ const DEFAULT_POSES: u32 = 5;
 /// Probability without `--level`.
 const DEFAULT_LEVEL: f64 = 0.95;
 
-/// Parses a finite number greater than 0.
-fn parse_positive(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
-    number.ok_or_else(|| "a positive number is needed".to_owned())
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum PurposeArgument {
-    /// Small errors of predictions in the workspace
-    Accuracy,
-    /// To tell apart the effects among which the loop did not decide
-    Causes,
-    /// Both, with equal weight
-    Both,
-}
-
-impl From<PurposeArgument> for Purpose {
-    fn from(argument: PurposeArgument) -> Self {
-        match argument {
-            PurposeArgument::Accuracy => Self::Accuracy,
-            PurposeArgument::Causes => Self::Causes,
-            PurposeArgument::Both => Self::Both,
-        }
-    }
-}
+/// Aims of the next poses, each with its name and a summary.
+const PURPOSES: [(&str, &str, Purpose); 3] = [
+    ("accuracy", "Small errors of predictions in the workspace", Purpose::Accuracy),
+    ("causes", "To tell apart the effects among which the loop did not decide", Purpose::Causes),
+    ("both", "Both, with equal weight", Purpose::Both),
+];
 
 /// Difference up to which two commands are those of one pose \[rad\] or \[m\].
 const SAME_COMMAND: f64 = 1e-4;
@@ -175,25 +152,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             None => PoseRanges::declared_or_measured(&problem, &data.measurements),
         }),
     };
-    let explanations = if arguments.purpose == PurposeArgument::Accuracy {
+    let explanations = if arguments.purpose == Purpose::Accuracy {
         None
     } else {
         let file = arguments.explanations.clone().unwrap_or_else(|| results.path("loop.json"));
         let explanations = Explanations::read(&file, &problem)?;
-        if let Some(words) = other_rows(&file, explanations.missing_rows(&data.measurements))
-            .filter(|_| !common.quiet)
-        {
-            diagnostic::warn(&words);
-        }
+        common.hint(other_rows(&file, explanations.missing_rows(&data.measurements)));
         Some(explanations)
     };
     let workspace = arguments.region.workspace()?;
-    super::tolerance::warn_if_tiny(arguments.tolerance_mm, common.quiet);
+    common.warn_if_tiny(arguments.tolerance_mm);
     let stop = interrupt::stop();
     let (next, options) = Line::during(common.prints_text(), stop.clone(), |sink| {
         let options = NextOptions {
             poses: arguments.poses as usize,
-            purpose: arguments.purpose.into(),
+            purpose: arguments.purpose,
             tolerance: arguments.tolerance_mm.map(|length| length * 1e-3),
             level: arguments.level,
             seed: source.seed,
@@ -204,37 +177,32 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         };
         design::next(&problem, &data, &candidates, &options).map(|next| (next, options))
     })?;
-    if let Some(words) = measured_already(&data.measurements, &next.poses)
-        .filter(|_| !source.candidates.is_empty() && !common.quiet)
-    {
-        diagnostic::warn(&words);
+    if !source.candidates.is_empty() {
+        common.hint(measured_already(&data.measurements, &next.poses));
     }
     let json = NextResult::new(&problem, &options, &next).to_json();
     let table = poses_csv(&problem, &next.poses);
     interrupt::begin_writing();
-    let page = report::next_page(&problem, &options, &next);
+    let story = report::next(&problem, &options, &next);
+    let page = story.page();
     let mut texts = vec![("next.json", json.as_str()), ("next.html", page.as_str())];
     if !next.poses.is_empty() {
         texts.push(("next.csv", table.as_str()));
     }
     results.write(&texts)?;
     common.print_result(&json, || {
-        let text = report::next_text(&problem, &options, &next);
         let step = next_step(arguments, &problem, (&next, &options), &results);
-        format!("{text}{}Next: {step}\n", results.written())
+        format!("{}{}Next: {step}\n", story.text(), results.written())
     })?;
-    if !next.found.is_trusted() {
+    let is_trusted = next.found.is_trusted();
+    if !is_trusted {
         diagnostic::warn(
             "the fit to the measured poses is not to be trusted: flexcal identify says why",
         );
-        return Ok(Outcome::NotTrusted);
     }
     let is_met = next.error.zip(options.tolerance).is_none_or(|(error, most)| error.bound <= most);
-    Ok(if next.stop == Some(StopReason::GainBelowNoise) && !is_met {
-        Outcome::NotPassed
-    } else {
-        Outcome::Done
-    })
+    let is_exhausted = next.stop == Some(StopReason::GainBelowNoise) && !is_met;
+    Ok(Outcome::from_trust(is_trusted && !is_exhausted))
 }
 
 /// States what to do after the choice of poses, with the commands.

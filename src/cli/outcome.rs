@@ -5,20 +5,17 @@
 pub enum Outcome {
     /// The command is done: exit status 0.
     Done,
-    /// The fit is not trusted: exit status 1.
-    NotTrusted,
-    /// The arm does not pass a tolerance, or further poses cannot reach it: exit status 1.
-    NotPassed,
+    /// The result is not to be trusted, is incomplete, or does not meet what was asked: exit status
+    /// 1.
+    NotMet,
     /// The arm has changed since its estimate: exit status 3.
     Changed,
-    /// The command was interrupted and wrote incomplete results: exit status 1.
-    Interrupted,
 }
 
 impl Outcome {
     /// Returns [`Done`](Self::Done) if the result of a command is trusted, else
-    /// [`NotTrusted`](Self::NotTrusted).
+    /// [`NotMet`](Self::NotMet).
     pub fn from_trust(is_trusted: bool) -> Self {
-        if is_trusted { Self::Done } else { Self::NotTrusted }
+        if is_trusted { Self::Done } else { Self::NotMet }
     }
 }

@@ -3,19 +3,18 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flexcal::design::{self, Candidates, Criterion, EffectPair, Plan, PlanOptions, PlanProgress};
 use flexcal::measurement::Measurements;
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PlanResult, poses_csv};
 
-use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::poses::{Source, parse_count};
+use super::poses::{Region, Source};
 use super::progress::Line;
-use super::region::Region;
+use super::{diagnostic, values};
 
 /// Arguments of `flexcal plan`.
 #[derive(Debug, Args)]
@@ -35,11 +34,11 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to measure
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::count::<10_000>)]
     poses: u32,
     /// Quantity to minimise
-    #[arg(long, value_enum, ignore_case = true, default_value_t = CriterionArgument::S)]
-    criterion: CriterionArgument,
+    #[arg(long, ignore_case = true, default_value = CRITERIA[0].0, value_parser = values::one_of(CRITERIA))]
+    criterion: Criterion,
     /// Choose poses that separate two effects, each as trace and loop print it and as a problem
     /// declares it
     #[arg(long, value_name = "EFFECT", num_args = 2, conflicts_with = "criterion")]
@@ -50,44 +49,34 @@ pub struct Arguments {
     source: Source,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum CriterionArgument {
-    /// The geometric mean of the standard errors
-    #[value(name = "S")]
-    S,
-    /// The mean variance, each parameter's in units of what average poses leave of it
-    #[value(name = "A")]
-    A,
-    /// The volume of the confidence ellipsoid
-    #[value(name = "D")]
-    D,
-    /// The largest variance of any combination, in units of what average poses leave of it
-    #[value(name = "E")]
-    E,
-    /// The mean variance of predicted positions in the ranges, with a misfit as large as the noise
-    #[value(name = "I")]
-    I,
-}
-
-impl From<CriterionArgument> for Criterion {
-    fn from(argument: CriterionArgument) -> Self {
-        match argument {
-            CriterionArgument::S => Self::S,
-            CriterionArgument::A => Self::A,
-            CriterionArgument::D => Self::D,
-            CriterionArgument::E => Self::E,
-            CriterionArgument::I => Self::I,
-        }
-    }
-}
+/// Criteria of a plan, each with its letter and a summary.
+const CRITERIA: [(&str, &str, Criterion); 5] = [
+    ("S", "The geometric mean of the standard errors", Criterion::S),
+    (
+        "A",
+        "The mean variance, each parameter's in units of what average poses leave of it",
+        Criterion::A,
+    ),
+    ("D", "The volume of the confidence ellipsoid", Criterion::D),
+    (
+        "E",
+        "The largest variance of any combination, in units of what average poses leave of it",
+        Criterion::E,
+    ),
+    (
+        "I",
+        "The mean variance of predicted positions in the ranges, with a misfit as large as the noise",
+        Criterion::I,
+    ),
+];
 
 /// Chooses the poses of the plan, writes `plan.csv`, `plan.json` and `plan.html`, and prints the
 /// accuracy that the plan is expected to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let declared = Problem::read(common.problem())?;
-    if declared.data.fits_orientation && !arguments.separate.is_empty() && !common.quiet {
-        diagnostic::warn("effects are told apart by positions: orientations do not count");
+    if declared.data.fits_orientation && !arguments.separate.is_empty() {
+        common.hint(["effects are told apart by positions: orientations do not count"]);
     }
     let pair = effect_pair(&arguments.separate, &declared)?;
     let declared_files = declared.data.files.clone();
@@ -112,7 +101,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if given.is_none() {
         common.warn(&problem.plausibility_warnings());
     }
-    let criterion = Criterion::from(arguments.criterion);
     let line = common.prints_text().then(Line::new);
     let show = |PlanProgress { start, sweep, value }: PlanProgress| {
         if let Some(line) = &line {
@@ -125,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let options = PlanOptions {
         workspace: workspace.as_ref(),
         poses: arguments.poses as usize,
-        criterion: &criterion,
+        criterion: &arguments.criterion,
         seed: source.seed,
         progress: Some(&show),
     };
@@ -140,23 +128,23 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         line.clear();
     }
     let (plan, separated) = result?;
-    let criterion = separated.as_ref().map_or(&criterion, |separated| &separated.criterion);
+    let criterion =
+        separated.as_ref().map_or(&arguments.criterion, |separated| &separated.criterion);
     let json =
         PlanResult::new(&problem, criterion, source.seed, &plan, separated.as_ref()).to_json();
     let table = poses_csv(&problem, &plan.poses);
-    let page = report::plan_page(&problem, criterion, &plan, separated.as_ref());
-    results.write(&[("plan.csv", &table), ("plan.json", &json), ("plan.html", &page)])?;
+    let story = report::plan(&problem, criterion, &plan, separated.as_ref());
+    results.write(&[("plan.csv", &table), ("plan.json", &json), ("plan.html", &story.page())])?;
     common.print_result(&json, || {
-        let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
         let table = results.path("plan.csv");
         let next = next_step(common, &problem, &declared_files, &table, &plan, pair.is_some());
-        format!("{text}{}Next: {next}\n", results.written())
+        format!("{}{}Next: {next}\n", story.text(), results.written())
     })?;
     if plan.suffices {
         return Ok(Outcome::Done);
     }
     diagnostic::warn("the plan does not determine all parameters without a prior: plan more poses");
-    Ok(Outcome::NotTrusted)
+    Ok(Outcome::NotMet)
 }
 
 /// Returns the columns that the measurements in `files` have and a table of planned poses lacks. All

@@ -8,14 +8,14 @@ use flexcal::fit::{self, Residual};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::{HeldOut, Problem};
-use flexcal::remainder::{self, BoundTest, Bounds, CorrectedPrediction};
+use flexcal::remainder::{self, Bounds, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
 
 use super::estimate::Trust;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::{advice, diagnostic};
+use super::{advice, diagnostic, values};
 
 /// Arguments of `flexcal predict`.
 #[derive(Debug, Args)]
@@ -37,7 +37,7 @@ pub struct Arguments {
     #[arg(long, value_name = "ESTIMATE.json")]
     estimate: Option<PathBuf>,
     /// Probability with which the bound of an error holds
-    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::parse_level)]
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = values::level)]
     level: f64,
     #[command(flatten)]
     trust: Trust,
@@ -91,9 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let bounds = bounds.as_ref();
     let measured = prediction.residuals.as_deref().unwrap_or_default();
-    if let Some(words) = common_error(&rows, measured).filter(|_| !common.quiet) {
-        diagnostic::warn(&words);
-    }
+    common.hint(common_error(&rows, measured));
     let is_position = |row: usize| rows.observation(row).is_position();
     let bounds_suffice = bounds.is_some() && (0..rows.len()).all(is_position);
     let errors = estimate
@@ -111,7 +109,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
     let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
-    let test = bounds.and_then(|bounds| test_bounds(bounds, (&rows, residuals), &fitted));
+    let lengths = residuals.iter().enumerate().map(|(row, of)| (row, row, of.position.norm()));
+    let of_others = lengths.filter(|(row, ..)| fitted.binary_search(row).is_err());
+    let test = bounds.map(|bounds| bounds.test(&rows, of_others)).filter(|test| test.of > 0);
     let tested = bounds.map(|bounds| (bounds, test.as_ref()));
     let errors = prediction.errors.as_ref().map(|errors_of_rows| {
         let errors = PredictionErrors::new(errors_of_rows, &prediction.spreads);
@@ -122,15 +122,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     });
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
-    texts.push((
-        RESULT_FILES[3],
-        report::prediction_page(&problem, arm, &prediction, (tested, &fitted)),
-    ));
+    let story = report::prediction(&problem, arm, &prediction, (tested, &fitted));
+    texts.push((RESULT_FILES[3], story.page()));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
     common.print_result(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
-        let text = report::prediction_text(&problem, arm, &prediction, (tested, &fitted));
+        let text = story.text();
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let next = match (&arguments.estimate, &estimate) {
             (Some(file), _) if fitted.is_empty() && test.is_some_and(|of| of.is_contradicted()) => format!(
@@ -178,16 +176,4 @@ fn common_error(rows: &Measurements, residuals: &[Residual]) -> Option<String> {
             mean.z * 1e3
         )
     })
-}
-
-/// Tests the bounds by the rows that are not among the `fitted` ones; `None` if no such row has an
-/// error and a bound.
-fn test_bounds(
-    bounds: &Bounds,
-    (rows, residuals): (&Measurements, &[Residual]),
-    fitted: &[usize],
-) -> Option<BoundTest> {
-    let errors = residuals.iter().enumerate().map(|(row, of)| (row, row, of.position.norm()));
-    let errors = errors.filter(|(row, ..)| fitted.binary_search(row).is_err());
-    Some(bounds.test(rows, errors)).filter(|test| test.of > 0)
 }

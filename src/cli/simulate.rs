@@ -9,11 +9,10 @@ use flexcal::problem::{HeldOut, Problem};
 use flexcal::report::shell_word;
 use flexcal::rig::{SimulatedPoses, Simulation, Truth, simulate_counted};
 
-use super::diagnostic;
 use super::flags::{Flags, file_in};
 use super::outcome::Outcome;
-use super::poses::parse_count;
 use super::progress::count_during;
+use super::{diagnostic, values};
 
 /// Arguments of `flexcal simulate`.
 #[derive(Debug, Args)]
@@ -30,7 +29,7 @@ pub struct Arguments {
     #[arg(long, value_name = "TRUTH.toml")]
     truth: PathBuf,
     /// Number of poses, drawn in the ranges of [poses]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_count::<1_000_000>, required_unless_present = "data")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = values::count::<1_000_000>, required_unless_present = "data")]
     poses: Option<u32>,
     /// Tables of poses to measure instead, such as plan.csv; positions in them are ignored
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "poses")]

@@ -218,17 +218,18 @@ fn finish(
 ) -> Result<Outcome, Box<dyn Error>> {
     let found = study::collect(study, stores)?;
     let json = StudyResult::new(study, &found).to_json();
+    let story = report::study(study, &found);
     let texts = [
         (RESULT_FILES[0], json.as_str()),
         (RESULT_FILES[1], &study_parameters_csv(study, &found)),
         (RESULT_FILES[2], &study_timing_csv(study, &found)),
         (RESULT_FILES[3], &study_csv(study, &found)),
-        (RESULT_FILES[4], &report::study_page(study, &found)),
+        (RESULT_FILES[4], &story.page()),
     ];
     results.write(&texts)?;
     common.flags.print_result(&json, || {
         let next = "Next: parameters.csv has bias, scatter and coverage of each parameter; docs/study.md explains the columns\n";
-        report::study_text(study, &found) + &results.written() + next
+        story.text() + &results.written() + next
     })?;
     let has_failed = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
     Ok(Outcome::from_trust(!found.cells.iter().any(has_failed)))

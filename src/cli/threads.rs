@@ -8,11 +8,6 @@ const VARIABLE: &str = "RAYON_NUM_THREADS";
 /// 1000 of them take 60 times the processor time of two.
 const MAX_THREADS: usize = 256;
 
-/// Returns the maximum number of threads that may be requested: at least one for each processor.
-fn max_threads() -> usize {
-    MAX_THREADS.max(thread::available_parallelism().map_or(1, usize::from))
-}
-
 /// Error for a number of threads that is not valid.
 #[derive(Debug, thiserror::Error)]
 #[error(
@@ -28,7 +23,8 @@ pub struct BadThreads {
 pub fn check() -> Result<(), BadThreads> {
     let Some(text) = env::var_os(VARIABLE) else { return Ok(()) };
     let text = text.to_string_lossy().into_owned();
-    let max = max_threads();
+    // At least one thread for each processor may be requested.
+    let max = MAX_THREADS.max(thread::available_parallelism().map_or(1, usize::from));
     match text.trim().parse::<usize>() {
         _ if text.is_empty() => Ok(()),
         Ok(threads) if threads <= max => Ok(()),

@@ -38,13 +38,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = result.to_json();
     // The effects are ranked in a fit to positions, whose model has no orientation of the tool.
     let plots = PlotData::of_identification(&problem.positions_alone(), &data, &trace.fit)?;
-    let page = report::trace_page(&problem, &trace, &plots);
-    results.write(&[("trace.json", &json), ("trace.html", &page)])?;
+    let story = report::trace(&problem, &trace, Some(&plots));
+    results.write(&[("trace.json", &json), ("trace.html", &story.page())])?;
     let outcome = diagnostic::report_fit(&trace.fit, common.quiet);
     common.print_result(&json, || {
-        let (text, next) =
-            (report::trace_text(&problem, &trace), advice::after_trace(common, &result));
-        format!("{text}{}Next: {next}\n", results.written())
+        let next = advice::after_trace(common, &result);
+        format!("{}{}Next: {next}\n", story.text(), results.written())
     })?;
     Ok(outcome)
 }

@@ -11,10 +11,9 @@ use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, WatchResult};
 
 use super::estimate::Trust;
-use super::identify::parse_days;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::{advice, diagnostic};
+use super::{advice, diagnostic, values};
 
 /// Arguments of `flexcal watch`.
 #[derive(Debug, Args)]
@@ -29,19 +28,13 @@ pub struct Arguments {
     #[arg(long, value_name = "ESTIMATE.json")]
     estimate: PathBuf,
     /// Days since the estimate, whose drift counts as no change
-    #[arg(long, value_name = "DAYS", default_value_t = 0.0, value_parser = parse_days)]
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0, value_parser = values::days)]
     drift: f64,
     /// Probability of an alarm at any row if nothing has changed
-    #[arg(long, value_name = "P", default_value_t = 0.01, value_parser = parse_probability)]
+    #[arg(long, value_name = "P", default_value_t = 0.01, value_parser = values::number(|p| p > 0.0 && p <= 0.5, "a probability above 0 and up to 0.5 is expected"))]
     false_alarms: f64,
     #[command(flatten)]
     trust: Trust,
-}
-
-/// Parses a probability greater than 0 and at most 0.5.
-fn parse_probability(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && *number <= 0.5);
-    number.ok_or_else(|| "a probability above 0 and up to 0.5 is expected".to_owned())
 }
 
 /// Returns the argument with the days since the estimate; empty for none.
@@ -84,19 +77,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
     }
     common.warn_of_loads(&problem, &estimate, &rows);
-    for session in estimate.unknown_sessions(&rows).into_iter().filter(|_| !common.quiet) {
-        diagnostic::warn(&format!(
+    common.hint(estimate.unknown_sessions(&rows).into_iter().map(|session| {
+        format!(
             "the estimate does not know session {session}: its base is fitted to these rows, so that a base or an instrument that has moved \
              cannot be seen; if it stands where it stood, give the rows the session of the estimate"
-        ));
-    }
+        )
+    }));
     let settings = (arguments.drift, arguments.false_alarms);
     let rows = rows.arm_rows();
     let watch = life::watch(&problem, &estimate, &rows, settings)?;
     let named = arguments.estimate.display().to_string();
     let json = WatchResult::new(&problem, &named, arguments.drift, &watch).to_json();
-    let page = report::watch_page(&problem, &watch, &rows);
-    results.write(&[("watch.json", &json), ("watch.html", &page)])?;
+    let story = report::watch(&problem, &watch, &rows);
+    results.write(&[("watch.json", &json), ("watch.html", &story.page())])?;
     common.print_result(&json, || {
         let file = shell_word(&arguments.estimate);
         let first = watch.causes.first().map(|cause| cause.kind);
@@ -131,8 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             advice::after_applying(common, &problem, &estimate, &arguments.estimate)
         };
-        let text = report::watch_text(&problem, &watch);
-        format!("{text}{}Next: {next}\n", results.written())
+        format!("{}{}Next: {next}\n", story.text(), results.written())
     })?;
     Ok(if watch.is_changed() { Outcome::Changed } else { Outcome::Done })
 }

@@ -10,7 +10,6 @@ mod plain;
 mod remedy;
 mod study;
 mod table;
-mod typography;
 mod urdf;
 mod warning;
 
@@ -23,12 +22,12 @@ pub(crate) use file_format::{JSON, TABLE, TOML, XML, binary_format, text_format}
 pub use kind::InputErrorKind;
 pub(crate) use near::{nearest, one_typo};
 pub(crate) use no_rows::NoRows;
+pub(crate) use plain::typographic;
 pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
 pub(crate) use study::StudyErrorKind;
 pub(crate) use table::JOINED;
 #[doc(hidden)]
 pub use table::TableErrorKind;
-pub(crate) use typography::typographic;
 pub(crate) use urdf::UrdfErrorKind;
 #[doc(hidden)]
 pub use warning::WarningKind;

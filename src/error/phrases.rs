@@ -9,6 +9,11 @@ pub(super) fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
+/// Returns ` and n more` for the number of names that a list leaves out; empty for none.
+pub(super) fn and_more(left: usize) -> String {
+    if left > 0 { format!(" and {left} more") } else { String::new() }
+}
+
 /// Returns `, near` and a quotation of the text near an error; empty for an empty text.
 pub(super) fn near_quote(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(", near `{text}`") }

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::near::suggestion;
+use super::phrases::and_more;
 
 /// Kind of error in a URDF; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -137,7 +138,6 @@ const MAX_LISTED_NAMES: usize = 30;
 /// Returns names separated by commas, and the number of further names if there are more than
 /// [`MAX_LISTED_NAMES`].
 fn listed(names: &[String]) -> String {
-    let more = names.len().saturating_sub(MAX_LISTED_NAMES);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let more = and_more(names.len().saturating_sub(MAX_LISTED_NAMES));
     names.iter().take(MAX_LISTED_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ") + &more
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::near::did_you_mean;
-use super::phrases::plural;
+use super::phrases::{and_more, plural};
 
 /// Kind of a warning, with its cause and remedy as message.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -305,7 +305,7 @@ fn declared_mass_hint(arm: Option<&str>) -> String {
 
 fn repeated_rows(rows: usize, named: &[String]) -> String {
     let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
-    let left = if left > 0 { format!(" and {left} more") } else { String::new() };
+    let left = and_more(left);
     let named = named.join(", ");
     match further {
         0 => String::new(),
@@ -317,7 +317,7 @@ fn repeated_rows(rows: usize, named: &[String]) -> String {
 /// Returns a clause that names the further rows of which a warning is true.
 fn further_rows(rows: usize, named: &[String]) -> String {
     let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
-    let left = if left > 0 { format!(" and {left} more") } else { String::new() };
+    let left = and_more(left);
     match further {
         0 => String::new(),
         1 => format!(", as does {}", named.join(", ")),
@@ -365,7 +365,7 @@ pub(super) fn nearest_in_time_hint(gap: Option<&str>) -> String {
 /// rows, the first included.
 pub(super) fn listed(rows: usize, others: &[String]) -> String {
     let left = rows.saturating_sub(1 + others.len());
-    let left = if left > 0 { format!(" and {left} more") } else { String::new() };
+    let left = and_more(left);
     if others.is_empty() { String::new() } else { format!(", then {}{left}", others.join(", ")) }
 }
 

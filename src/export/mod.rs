@@ -15,7 +15,6 @@ mod remainder;
 mod rigid;
 mod source;
 mod standard;
-mod tables;
 
 pub use answers::{Answers, answers};
 #[doc(hidden)]
@@ -25,4 +24,4 @@ pub use geometries::{Geometry, GeometryChoice};
 pub use rigid::RigidFit;
 pub use source::{Sources, sources};
 pub use standard::StandardTable;
-pub use tables::modified_dh;
+pub use standard::modified_dh;

@@ -2,7 +2,7 @@
 //! generated C code.
 
 use crate::laws::expression::Expression;
-use crate::mechanics::{Angle, Beam, Joint, PointMass};
+use crate::mechanics::{Angle, Beam, Joint};
 use crate::model::parameter::Regressor;
 use crate::model::{ModelParts, PartSite};
 use crate::spatial::Frame;
@@ -126,11 +126,8 @@ impl Numbers {
         numbers.begin("LOAD");
         for (number, length, beam) in beams() {
             for mass in &beam.masses {
-                numbers.push_block(
-                    &format!("load on beam of joint {number}:"),
-                    LOAD,
-                    &of_mass(mass),
-                );
+                let values = [mass.mass, mass.at.x, mass.at.y, mass.at.z];
+                numbers.push_block(&format!("load on beam of joint {number}:"), LOAD, &values);
             }
             if let Some(added) = &beam.added {
                 let values = [added.mass, added.at * length.signum(), 0.0, 0.0];
@@ -245,11 +242,6 @@ fn of_beam(beam: &Beam<f64>) -> Vec<f64> {
     let strain = strain.map_or([0.0; 3], |s| [s.axial, s.curvature[0], s.curvature[1]]);
     let stiff = [beam.mass, k.axial, k.about_y, k.about_z, k.twist];
     [&stiff[..], &coupling, &strain].concat()
-}
-
-/// Returns the numbers of a point mass in the order of [`LOAD`].
-fn of_mass(mass: &PointMass) -> [f64; 4] {
-    [mass.mass, mass.at.x, mass.at.y, mass.at.z]
 }
 
 /// Returns the numbers of a frame in the order of [`FRAME`].

@@ -24,6 +24,12 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(if sorted.len() % 2 == 1 { upper } else { 0.5 * (sorted[sorted.len() / 2 - 1] + upper) })
 }
 
+/// Returns the integer part of a count or index of at least 0; 0 for smaller values and for NaN.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts are limited")]
+pub(crate) fn whole(value: f64) -> usize {
+    value as usize
+}
+
 /// Returns the smallest and the largest of the finite values; (∞, −∞) if there are none.
 pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let finite = values.into_iter().filter(|value| value.is_finite());

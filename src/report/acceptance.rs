@@ -1,7 +1,7 @@
 //! Record of the command `accept`, to be signed: accuracy before and after, conditions and inputs.
 
-use super::arm_names::NOMINAL_ARM;
 use super::document::{Block, Headline, Table};
+use super::errors::NOMINAL_ARM;
 use super::remainder::{HELD_OUT, chance_of_bound};
 use super::render::{report, text};
 use crate::fit::Verdict;

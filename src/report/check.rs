@@ -5,24 +5,15 @@ use super::document::{Block, Column, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, FAINT, INK, Series};
 use super::forecast::{assumptions, cells, poses_to_measure};
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
-use super::render::{page, text};
+use super::render::Story;
 use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm};
 
-/// Returns the forecast of the command `check` as text, ending in a line break.
-pub fn check_text(problem: &Problem, check: &Check) -> String {
-    text(&blocks(problem, check))
-}
-
-/// Returns the forecast as a page, with a figure of the error of predictions against the number of
-/// poses.
-pub(crate) fn check_page(problem: &Problem, check: &Check) -> String {
-    page(&problem.title, "check", &blocks(problem, check))
-}
-
-fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
+/// Returns the forecast of the command `check`, with a figure of the error of predictions against
+/// the number of poses.
+pub fn check(problem: &Problem, check: &Check) -> Story {
     let forecast = &check.forecast;
     let names: Vec<String> =
         forecast.expected.iter().map(|expected| expected.name.clone()).collect();
@@ -65,7 +56,7 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
     let poses = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
     blocks.extend(assumptions(problem, &forecast.expected, poses));
     blocks.extend(detection::blocks(problem, &check.detection));
-    blocks
+    Story::new(&problem.title, "check", blocks)
 }
 
 /// Draws the expected error of predictions against the number of poses.

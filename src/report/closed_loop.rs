@@ -1,9 +1,12 @@
 //! Texts of the command `loop`: summary for one screen, full text (`--verbose`), and report.
 
-use super::arm_names::{DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
-use super::document::{Block, Headline, Point, Table, code, first_of, joined, split_at_most};
-use super::errors::{both_parts, error_label, held_out_rows, rows_of, test_rows_word, unpredicted};
-use super::figures;
+use super::document::{
+    Block, Headline, Point, Table, code, first_of, joined, percent, split_at_most,
+};
+use super::errors::{
+    DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM, both_parts, error_label, held_out_rows, rows_of,
+    test_rows_word, unpredicted,
+};
 use super::found_effects::{found_effects, found_heading, rounds, status_table};
 use super::identify::{
     fit_warnings, identifiability_with_figures, mean_error, parameters_fact, rms_and_largest,
@@ -11,7 +14,6 @@ use super::identify::{
 };
 use super::noise::{expected_interval, format_chi2, influential_rows, residual_fact};
 use super::parameters::{against_priors, parameters};
-use super::probability::percent;
 use super::remainder::{PredictionAccuracy, why_no_bound};
 use super::render::{Report, report, text};
 use super::residual_tests::{self, other_reduced_chi2};
@@ -19,7 +21,7 @@ use super::unexplained::{structure_places, structure_sentences, to_declare};
 use super::verdict::{
     alternative, causes, effect_counts, has_place, stand_in_sentence, title, unknown_part, verdict,
 };
-use super::{effect, trace};
+use super::{effect, figures, trace};
 use crate::fit::ErrorSummary;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};

@@ -68,17 +68,11 @@ fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
         p_value(found.p_value)
     );
     let parameters: Vec<_> = found.estimates.iter().map(ParameterValue::new).collect();
+    let seen = seen_ranges(&found.ranges);
     // A custom effect may describe itself in several lines.
     std::iter::once(first)
         .chain(values(&found.effect, &parameters))
-        .chain(ranges_of_law(found))
+        .chain(seen.map(|seen| format!("Seen for {seen}; beyond, it is an extrapolation.")))
         .map(|line| one_line(&line.replace('\n', " ")))
         .collect()
-}
-
-/// States the identification ranges of the quantities in a law that the search composed; `None` for
-/// other effects.
-fn ranges_of_law(found: &Found) -> Option<String> {
-    let seen = seen_ranges(&found.ranges)?;
-    Some(format!("Seen for {seen}; beyond, it is an extrapolation."))
 }

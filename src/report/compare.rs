@@ -1,9 +1,10 @@
 //! Texts of the command `compare`: every strategy, solver and ablation, and the paper's tables 2
 //! and 3.
 
-use super::arm_names::NOMINAL_ARM;
 use super::document::{Block, Column, Headline, Table, code};
-use super::errors::{both_parts, header, held_out_rows, row_noun, unit};
+use super::errors::{
+    NOMINAL_ARM, both_parts, held_out_rows, row_noun, test_rows_word, unit, with_unit_of,
+};
 use super::figures;
 use super::identify::{
     errors_by_axis, fit_details, fit_sentence, fit_warnings, mean_error, no_errors,
@@ -13,12 +14,10 @@ use super::noise::residual_fact;
 use super::paper_tables::{table_2, table_3, title};
 use super::render::{Report, report, text};
 use crate::fit::{Comparison, Identification};
+use crate::model::Ablation;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 use crate::results::{ComparedFit, PlotData, Summary};
-
-/// Name of a fit in a table, with its result.
-type NamedFit = (String, ComparedFit);
 
 /// Returns the comparison as text, ending in a line break.
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
@@ -59,17 +58,17 @@ fn is_elastic(comparison: &Comparison) -> bool {
 
 /// States which strategy and solver has the smallest mean held-out error, or that all agree.
 fn verdict(comparison: &Comparison) -> String {
-    let fits = named_strategies(comparison);
-    let mean = |(_, fit): &&NamedFit| fit.errors.judged().norms().0[0];
-    let is_finite = |fit: &&NamedFit| mean(fit).is_finite();
-    let by_mean = |a: &&NamedFit, b: &&NamedFit| mean(a).total_cmp(&mean(b));
+    let fits = compared_strategies(comparison);
+    let mean = |fit: &&ComparedFit| fit.errors.judged().norms().0[0];
+    let is_finite = |fit: &&ComparedFit| mean(fit).is_finite();
+    let by_mean = |a: &&ComparedFit, b: &&ComparedFit| mean(a).total_cmp(&mean(b));
     let best = fits.iter().filter(is_finite).min_by(by_mean);
     let worst = fits.iter().filter(is_finite).max_by(by_mean);
     let (Some(best), Some(worst)) = (best, worst) else {
         return "No strategy has an error to compare.".to_owned();
     };
-    let unit = best.1.errors.judged().norms().1;
-    let size = |fit: &NamedFit| format!("{} {unit}", number(mean(&fit), 4));
+    let unit = best.errors.judged().norms().1;
+    let size = |fit: &ComparedFit| format!("{} {unit}", number(mean(&fit), 4));
     let rows = held_out_rows(&comparison.joint);
     if size(best) == size(worst) {
         return format!(
@@ -81,20 +80,20 @@ fn verdict(comparison: &Comparison) -> String {
     format!(
         "Smallest mean error of the {rows}: {} ({}, {}); largest: {} ({}, {}).",
         size(best),
-        best.0,
-        best.1.solver,
+        best.strategy,
+        best.solver,
         size(worst),
-        worst.0,
-        worst.1.solver
+        worst.strategy,
+        worst.solver
     )
 }
 
 /// Returns the table of strategies and solvers in which fits with equal errors share a row. Notes
 /// name the fits of each shared row. If `is_timed`, the table contains durations.
 fn grouped_strategies(comparison: &Comparison, is_timed: bool) -> Table {
-    let (mut shown, mut same): (Vec<NamedFit>, Vec<Vec<NamedFit>>) = (Vec::new(), Vec::new());
-    for fit in named_strategies(comparison) {
-        let is_equal = |other: &NamedFit| errors_in_digits(other) == errors_in_digits(&fit);
+    let (mut shown, mut same) = (Vec::<ComparedFit>::new(), Vec::<Vec<ComparedFit>>::new());
+    for fit in compared_strategies(comparison) {
+        let is_equal = |other: &ComparedFit| errors_in_digits(other) == errors_in_digits(&fit);
         if let Some(index) = shown.iter().position(is_equal) {
             same[index].push(fit);
         } else {
@@ -103,19 +102,17 @@ fn grouped_strategies(comparison: &Comparison, is_timed: bool) -> Table {
         }
     }
     let mut table = side_by_side(comparison, "strategy", &shown, is_timed);
-    for ((name, fit), others) in shown.iter().zip(&same).filter(|(_, others)| !others.is_empty()) {
+    for (fit, others) in shown.iter().zip(&same).filter(|(_, others)| !others.is_empty()) {
         let mut strategies: Vec<(&str, Vec<&str>)> = Vec::new();
-        for (strategy, other) in others {
-            match strategies.last_mut() {
-                Some((last, solvers)) if last == strategy => solvers.push(other.solver),
-                _ => strategies.push((strategy, vec![other.solver])),
-            }
+        for other in others.chunk_by(|a, b| a.strategy == b.strategy) {
+            strategies.push((&other[0].strategy, other.iter().map(|fit| fit.solver).collect()));
         }
         let words =
             strategies.iter().map(|(name, solvers)| format!("{name} ({})", solvers.join(", ")));
         let unit = fit.errors.judged().norms().1;
         table.notes.push(format!(
-            "the same to 0.0001 {unit} as {name}, {}: {}",
+            "the same to 0.0001 {unit} as {}, {}: {}",
+            fit.strategy,
             fit.solver,
             words.collect::<Vec<_>>().join("; ")
         ));
@@ -124,7 +121,7 @@ fn grouped_strategies(comparison: &Comparison, is_timed: bool) -> Table {
 }
 
 /// Returns the errors of a fit, rounded to the digits that the table shows.
-fn errors_in_digits((_, fit): &NamedFit) -> Vec<String> {
+fn errors_in_digits(fit: &ComparedFit) -> Vec<String> {
     let summaries = [fit.errors.judged(), &fit.errors.identification];
     summaries.iter().flat_map(|summary| summary.norms().0).map(|value| number(value, 4)).collect()
 }
@@ -242,77 +239,64 @@ fn blocks<'a>(
 }
 
 /// Returns the fits of every strategy and solver, those of the paper last.
-fn named_strategies(comparison: &Comparison) -> Vec<NamedFit> {
+fn compared_strategies(comparison: &Comparison) -> Vec<ComparedFit> {
     let strategies = comparison.strategies.iter().map(ComparedFit::from);
-    let fits = strategies.chain(comparison.paper.iter().map(ComparedFit::from));
-    fits.map(|fit| (fit.strategy.clone(), fit)).collect()
+    strategies.chain(comparison.paper.iter().map(ComparedFit::from)).collect()
 }
 
 /// Returns the table with one row for every strategy and solver.
 fn every_strategy(comparison: &Comparison) -> Table {
-    side_by_side(comparison, "strategy", &named_strategies(comparison), false)
+    side_by_side(comparison, "strategy", &compared_strategies(comparison), false)
 }
 
 /// Returns the table of the fits with only a part of the elasticity, one row for each part.
 fn ablations(comparison: &Comparison, is_timed: bool) -> Table {
-    let named = comparison.ablations.iter();
-    let named: Vec<NamedFit> =
-        named.map(|(part, found)| (part.as_str().to_owned(), found.into())).collect();
-    side_by_side(comparison, "elasticity", &named, is_timed)
+    let named = |(part, found): &(Ablation, Identification)| ComparedFit {
+        strategy: part.as_str().to_owned(),
+        ..found.into()
+    };
+    let fits: Vec<ComparedFit> = comparison.ablations.iter().map(named).collect();
+    side_by_side(comparison, "elasticity", &fits, is_timed)
 }
 
 /// Returns the table of `fits`; `first` is the header of the column of their names. If `is_timed`,
 /// the table contains durations, which differ from run to run; otherwise it contains more errors.
 fn side_by_side(
     comparison: &Comparison,
-    first: &'static str,
-    fits: &[NamedFit],
+    first: &str,
+    fits: &[ComparedFit],
     is_timed: bool,
 ) -> Table {
-    let column = |name: &'static str, cell: fn(&ComparedFit) -> String| {
-        Column::number(name, move |(_, fit): &NamedFit| cell(fit))
-    };
     let norm = |summary: &Summary, which: usize| number(summary.norms().0[which], 4);
-    let held_out = move |name: &'static str, which: usize| {
-        Column::number(name, move |(_, fit): &NamedFit| norm(fit.errors.judged(), which))
+    let held_out_errors = &comparison.joint.fitted.held_out;
+    let held_out = |words: &str, which: usize| {
+        let cell = move |fit: &ComparedFit| norm(fit.errors.judged(), which);
+        Column::number(with_unit_of(held_out_errors, words), cell)
     };
-    let fitted = move |name: &'static str, which: usize| {
-        Column::number(name, move |(_, fit): &NamedFit| norm(&fit.errors.identification, which))
+    let fitted = |words: &str, which: usize| {
+        let cell = move |fit: &ComparedFit| norm(&fit.errors.identification, which);
+        Column::number(with_unit_of(held_out_errors, words), cell)
     };
-    let heading = |names: [&'static str; 3]| header(&comparison.joint.fitted.held_out, names);
-    let is_left_out = comparison.joint.fitted.is_left_out;
-    let mean = if is_left_out {
-        heading(["left out mean, mm", "left out mean, °", "left out mean, px"])
-    } else {
-        heading(["held out mean, mm", "held out mean, °", "held out mean, px"])
-    };
-    let rms = heading(["rms, mm", "rms, °", "rms, px"]);
-    let fitted_rms = heading(["fitted rms, mm", "fitted rms, °", "fitted rms, px"]);
-    let fitted_mean = heading(["fitted mean, mm", "fitted mean, °", "fitted mean, px"]);
-    let largest = if is_left_out {
-        heading(["left out max, mm", "left out max, °", "left out max, px"])
-    } else {
-        heading(["held out max, mm", "held out max, °", "held out max, px"])
-    };
+    let test_rows = test_rows_word(&comparison.joint.fitted);
     let mut columns = vec![
-        Column::words(first, |(name, _): &NamedFit| name.clone()),
-        Column::words("solver", |(_, fit): &NamedFit| fit.solver.to_owned()).minor(),
-        held_out(mean, 0),
-        held_out(rms, 1),
-        fitted(fitted_rms, 1).minor(),
-        column("steps", |fit| fit.iterations.to_string()).minor(),
-        column("evaluations", |fit| fit.evaluations.to_string()).minor(),
+        Column::words(first, |fit: &ComparedFit| fit.strategy.clone()),
+        Column::words("solver", |fit: &ComparedFit| fit.solver.to_owned()).minor(),
+        held_out(&format!("{test_rows} mean"), 0),
+        held_out("rms", 1),
+        fitted("fitted rms", 1).minor(),
+        Column::number("steps", |fit: &ComparedFit| fit.iterations.to_string()).minor(),
+        Column::number("evaluations", |fit: &ComparedFit| fit.evaluations.to_string()).minor(),
     ];
     if is_timed {
-        columns.push(column("ms", |fit| number(fit.seconds * 1e3, 1)));
+        columns.push(Column::number("ms", |fit: &ComparedFit| number(fit.seconds * 1e3, 1)));
     }
     let condition =
         |fit: &ComparedFit| or_dash(fit.condition_number, |value| format!("{value:.1e}"));
-    columns.push(column("condition", condition).minor());
-    let termination = |(_, fit): &NamedFit| fit.termination.to_owned();
+    columns.push(Column::number("condition", condition).minor());
+    let termination = |fit: &ComparedFit| fit.termination.to_owned();
     columns.push(Column::words("termination", termination).minor());
     if !is_timed {
-        columns.extend([fitted(fitted_mean, 0), held_out(largest, 2)]);
+        columns.extend([fitted("fitted mean", 0), held_out(&format!("{test_rows} max"), 2)]);
     }
     Table::of(fits, &columns)
 }

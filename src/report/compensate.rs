@@ -1,4 +1,5 @@
-//! Text of the command `compensate`.
+//! Text of the command `compensate`, and recognition of targets that are given in another frame or
+//! unit than stated, or with senseless start configurations.
 
 use std::fmt::Write as _;
 
@@ -7,9 +8,9 @@ use super::remainder::bound_sentence;
 use super::render::text;
 use crate::fit::Command;
 use crate::measurement::Measurements;
-use crate::problem::Problem;
+use crate::problem::{Joint, JointKind, Problem};
 use crate::quantity::format::{mm, number};
-use crate::remainder::Bounds;
+use crate::remainder::{Bounds, TargetFrame};
 use crate::results::CompensationResult;
 
 /// Returns the summary of the commands as text, with file and line of each target that cannot be
@@ -57,4 +58,203 @@ pub fn commands_text(
     };
     let points = commands.iter().filter(|command| !command.is_reached()).map(point).collect();
     text(&[Block::Lines(words, points)])
+}
+
+/// Mean distance from the targets to the positions that their joint columns predict, above which
+/// another frame or unit is tried \[m\]. Errors of arms are a few millimetres.
+const MIN_MISS: f64 = 0.05;
+/// Largest ratio of this distance in another frame or unit to the distance as given, at which the
+/// other frame or unit is probably meant.
+const MAX_MISS_RATIO: f64 = 0.1;
+
+/// Maximum number of joints of which two columns are tried as exchanged.
+const MAX_EXCHANGED: usize = 8;
+/// Minimum number of targets that show a common offset.
+const MIN_TARGETS: usize = 3;
+/// Smallest common offset of targets that is reported \[m\]. Errors of arms are smaller.
+const MIN_COMMON_OFFSET: f64 = 0.02;
+/// Largest ratio between the offsets of two targets that count as equal.
+const MAX_COMMON_RATIO: f64 = 1.1;
+/// Maximum number of targets with which other readings are tried.
+const MAX_TRIED_TARGETS: usize = 50;
+/// Number of coordinates of a position and an orientation.
+const POSE_NUMBERS: usize = 6;
+
+/// Mean distance from the targets to the positions that their joint columns predict, above which
+/// these columns do not tell which configuration of the arm is meant \[m\].
+const MIN_FAR_START: f64 = 0.3;
+
+/// Warnings about targets and their joint columns.
+#[derive(Debug)]
+pub struct Doubts {
+    /// Warning that names another frame, unit or order of columns that is probably meant; `None` if
+    /// none fits better.
+    pub misplaced: Option<String>,
+    /// Other warnings.
+    pub others: Vec<String>,
+}
+
+impl Doubts {
+    /// Collects the warnings about the targets and their commands. `solve` finds the commands for
+    /// targets in a frame, and `option` returns the option of the caller that chooses a frame.
+    pub fn new(
+        problem: &Problem,
+        (targets, frame, commands): (&Measurements, TargetFrame, &[Command]),
+        option: impl Fn(TargetFrame) -> String,
+        solve: impl Fn(Measurements, TargetFrame) -> Option<Vec<Command>>,
+    ) -> Self {
+        let misplaced = warning(problem, (targets, frame, commands), option, solve);
+        let starts = common_offset(targets, commands).or_else(|| far_starts(targets, commands));
+        let starts = starts.filter(|_| misplaced.is_none());
+        let others = [starts, too_few_joints(problem, targets, commands)];
+        Self { misplaced, others: others.into_iter().flatten().collect() }
+    }
+}
+
+/// Returns a warning that names the frame or unit in which the targets are much nearer to the
+/// positions of their joint columns; `None` if there is no such frame or unit. `solve` finds the
+/// commands for targets in a frame.
+fn warning(
+    problem: &Problem,
+    (targets, frame, commands): (&Measurements, TargetFrame, &[Command]),
+    option: impl Fn(TargetFrame) -> String,
+    solve: impl Fn(Measurements, TargetFrame) -> Option<Vec<Command>>,
+) -> Option<String> {
+    let given = mean_miss(commands);
+    if !targets.position_measured || given <= MIN_MISS {
+        return None;
+    }
+    // Some of the targets tell as much as all of them.
+    let step = targets.len().div_ceil(MAX_TRIED_TARGETS).max(1);
+    let targets = &targets.select(&(0..targets.len()).step_by(step).collect::<Vec<_>>());
+    let other = match frame {
+        TargetFrame::Measuring => TargetFrame::Base,
+        TargetFrame::Base => TargetFrame::Measuring,
+    };
+    let scaled = |factor: f64| {
+        let mut scaled = targets.clone();
+        scaled.positions.iter_mut().for_each(|position| *position *= factor);
+        scaled
+    };
+    let has_unit = |unit: f64| {
+        targets.position_unit.is_some_and(|declared| (declared / unit - 1.0).abs() < 1e-9)
+    };
+    let mut trials = vec![(targets.clone(), other, option(other))];
+    if has_unit(1e-3) {
+        trials.push((scaled(1e3), frame, "metres instead of the declared millimetres".to_owned()));
+        trials.push((scaled(25.4), frame, "inches instead of the declared millimetres".to_owned()));
+    } else if has_unit(1.0) {
+        trials.push((scaled(1e-3), frame, "millimetres instead of the declared metres".to_owned()));
+    }
+    let axes = [(0, 1, "x and y"), (0, 2, "x and z"), (1, 2, "y and z")];
+    trials.extend(axes.map(|(first, second, names)| {
+        let mut exchanged = targets.clone();
+        let positions = exchanged.positions.iter_mut();
+        positions.for_each(|position| position.swap_rows(first, second));
+        (exchanged, frame, format!("the columns of {names} exchanged"))
+    }));
+    trials.extend(
+        of_joints(problem, targets).into_iter().map(|(targets, words)| (targets, frame, words)),
+    );
+    let misses = trials.into_iter().filter_map(|(targets, frame, words)| {
+        let miss = mean_miss(&solve(targets, frame)?);
+        (miss < MAX_MISS_RATIO * given).then_some((miss, words))
+    });
+    let (miss, words) = misses.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "the targets are {:.0} mm from where their joint columns lead, and with {words} {:.1} mm: \
+         check frame, units and columns of the targets before the arm is moved",
+        given * 1e3,
+        miss * 1e3
+    ))
+}
+
+/// Returns the targets with other readings of their joint columns, each with its words: radians
+/// under degrees, and two columns exchanged.
+fn of_joints(problem: &Problem, targets: &Measurements) -> Vec<(Measurements, String)> {
+    let kinds: Vec<JointKind> = problem.joints.iter().map(Joint::command_kind).collect();
+    let with = |change: &dyn Fn(&mut [f64])| {
+        let mut changed = targets.clone();
+        changed.configurations.chunks_exact_mut(targets.joints.max(1)).for_each(change);
+        changed
+    };
+    let turning = |joint: usize| kinds.get(joint) == Some(&JointKind::Revolute);
+    let are_degrees = targets.command_columns.iter().all(|column| column.unit < 1.0);
+    let mut trials = Vec::new();
+    if are_degrees && !targets.command_columns.is_empty() {
+        let to_degrees = |q: &mut [f64]| {
+            let angles = q.iter_mut().enumerate().filter(|(joint, _)| turning(*joint));
+            angles.for_each(|(_, angle)| *angle = angle.to_degrees());
+        };
+        let words = "start joints in radians instead of the declared degrees".to_owned();
+        trials.push((with(&to_degrees), words));
+    }
+    let moving: Vec<usize> = (0..targets.joints.min(MAX_EXCHANGED))
+        .filter(|&joint| kinds.get(joint).is_some_and(|kind| *kind != JointKind::Fixed))
+        .collect();
+    for (k, &first) in moving.iter().enumerate() {
+        for &second in moving.iter().skip(k + 1) {
+            if kinds.get(first) == kinds.get(second) {
+                let words =
+                    format!("the columns of joints {} and {} exchanged", first + 1, second + 1);
+                trials.push((with(&|q: &mut [f64]| q.swap(first, second)), words));
+            }
+        }
+    }
+    trials
+}
+
+/// Returns a warning if all targets are about as far from where their joint columns lead, as they
+/// are if they belong to another point of the tool or to another frame.
+fn common_offset(targets: &Measurements, commands: &[Command]) -> Option<String> {
+    let misses = || commands.iter().map(|command| command.seed_miss);
+    let least = misses().fold(f64::INFINITY, f64::min);
+    let most = misses().fold(0.0, f64::max);
+    let is_common = commands.len() >= MIN_TARGETS && most < MAX_COMMON_RATIO * least;
+    (targets.position_measured && is_common && least > MIN_COMMON_OFFSET).then(|| {
+        format!(
+            "every target is {:.1} to {:.1} mm from where its joint columns lead: are the targets of \
+             another point of the tool, or in another frame?",
+            least * 1e3,
+            most * 1e3
+        )
+    })
+}
+
+/// Returns a warning if the joint columns lead so far from the targets that they do not tell which
+/// of the configurations that reach a target is meant.
+fn far_starts(targets: &Measurements, commands: &[Command]) -> Option<String> {
+    let miss = mean_miss(commands);
+    (targets.position_measured && miss > MIN_FAR_START).then(|| {
+        format!(
+            "the targets are {:.0} mm on average from where their joint columns lead, so that the \
+             commands may be of another configuration of the arm than is meant: check units, order \
+             and names of the joint columns before the arm is moved",
+            miss * 1e3
+        )
+    })
+}
+
+/// Returns a warning if targets with orientations are not reached by an arm of fewer than six
+/// joints.
+fn too_few_joints(
+    problem: &Problem,
+    targets: &Measurements,
+    commands: &[Command],
+) -> Option<String> {
+    let moving = problem.joints.iter().filter(|joint| joint.command_kind() != JointKind::Fixed);
+    let (joints, missed) =
+        (moving.count(), commands.iter().filter(|command| !command.is_reached()).count());
+    (targets.orientations.is_some() && joints < POSE_NUMBERS && missed > 0).then(|| {
+        format!(
+            "{joints} joints cannot hold both a position and an orientation, which are {POSE_NUMBERS} \
+             numbers; leave the columns of the orientation out to reach positions alone"
+        )
+    })
+}
+
+/// Returns the mean distance from the targets to the positions that their joint columns predict
+/// \[m\].
+fn mean_miss(commands: &[Command]) -> f64 {
+    commands.iter().map(|command| command.seed_miss).sum::<f64>() / commands.len().max(1) as f64
 }

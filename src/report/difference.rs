@@ -7,7 +7,7 @@ use statrs::distribution::{ContinuousCDF as _, Normal};
 
 use super::document::{Block, Column, Table};
 use super::figures::{ACCENT, Drawing, Forest};
-use super::render::{page, text};
+use super::render::Story;
 use crate::fit::SavedEstimate;
 use crate::numeric::{Interval, mean_interval};
 use crate::quantity::Unit;
@@ -82,17 +82,8 @@ impl Difference {
     }
 }
 
-/// Returns the comparison as text, ending in a line break.
-pub(crate) fn difference_text(sides: &[Side; 2]) -> String {
-    text(&blocks(sides))
-}
-
-/// Returns the comparison as a page with all parameters.
-pub(crate) fn difference_page(sides: &[Side; 2]) -> String {
-    page(sides[0].estimate.problem_name(), "two results", &blocks(sides))
-}
-
-fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
+/// Returns the comparison; its page has all parameters.
+pub(crate) fn difference(sides: &[Side; 2]) -> Story {
     let differences = differences(sides);
     let tested = differences.iter().filter(|of| of.sigmas().is_some()).count();
     let limit =
@@ -125,7 +116,7 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
         blocks.push(Block::Words(vec![Block::Text(words)]));
     }
     blocks.push(Block::Page(vec![Block::Table(table(&differences))]));
-    blocks
+    Story::new(sides[0].estimate.problem_name(), "two results", blocks)
 }
 
 /// States the mean errors without the remainder of each side that has one.

@@ -67,7 +67,7 @@ pub(super) enum Mark {
 /// Table of texts. Columns are aligned to the right, except those with the indices `left`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Table {
-    pub header: Vec<&'static str>,
+    pub header: Vec<String>,
     pub rows: Vec<Vec<String>>,
     pub left: Vec<usize>,
     /// Notes that explain the table: below it on terminals, above it on the page.
@@ -80,7 +80,7 @@ pub(super) struct Table {
 
 /// Column of a table: its name with the unit, its alignment, and the cell of each item.
 pub(super) struct Column<'a, T> {
-    name: &'static str,
+    name: String,
     is_left: bool,
     is_minor: bool,
     cell: Box<dyn Fn(&T) -> String + 'a>,
@@ -88,12 +88,12 @@ pub(super) struct Column<'a, T> {
 
 impl<'a, T> Column<'a, T> {
     /// Creates a column of numbers, aligned to the right.
-    pub fn number(name: &'static str, cell: impl Fn(&T) -> String + 'a) -> Self {
-        Self { name, is_left: false, is_minor: false, cell: Box::new(cell) }
+    pub fn number(name: impl Into<String>, cell: impl Fn(&T) -> String + 'a) -> Self {
+        Self { name: name.into(), is_left: false, is_minor: false, cell: Box::new(cell) }
     }
 
     /// Creates a column of texts, aligned to the left.
-    pub fn words(name: &'static str, cell: impl Fn(&T) -> String + 'a) -> Self {
+    pub fn words(name: impl Into<String>, cell: impl Fn(&T) -> String + 'a) -> Self {
         Self { is_left: true, ..Self::number(name, cell) }
     }
 
@@ -156,8 +156,9 @@ impl From<String> for Point {
 }
 
 impl Table {
-    pub fn new(header: &[&'static str], rows: Vec<Vec<String>>, left: &[usize]) -> Self {
-        Self { header: header.to_vec(), rows, left: left.to_vec(), ..Self::default() }
+    pub fn new(header: &[&str], rows: Vec<Vec<String>>, left: &[usize]) -> Self {
+        let header = header.iter().map(|&name| name.to_owned()).collect();
+        Self { header, rows, left: left.to_vec(), ..Self::default() }
     }
 
     /// Creates a table with a row for each of `items`.
@@ -167,7 +168,7 @@ impl Table {
         };
         let row = |item: &'t T| columns.iter().map(|column| (column.cell)(item)).collect();
         Self {
-            header: columns.iter().map(|column| column.name).collect(),
+            header: columns.iter().map(|column| column.name.clone()).collect(),
             rows: items.into_iter().map(row).collect(),
             left: indices(|column| column.is_left),
             minor: indices(|column| column.is_minor),
@@ -231,4 +232,16 @@ pub(super) fn split_at_most(
     let more = listed.len().saturating_sub(max);
     listed.truncate(max);
     (listed, more)
+}
+
+/// Smallest probability at which a text calls a law, or a cause at a place, more probable than not.
+pub(super) const MIN_PROBABLE: f64 = 0.5;
+
+/// Formats a probability (0 to 1) as a percentage, as "over 99 %" or "under 1 %" at the ends.
+pub(super) fn percent(probability: f64) -> String {
+    match probability {
+        p if p > 0.995 => "over 99 %".to_owned(),
+        p if p < 0.005 => "under 1 %".to_owned(),
+        p => format!("{:.0} %", 100.0 * p),
+    }
 }

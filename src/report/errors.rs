@@ -1,5 +1,5 @@
-//! Errors in words: labels and units by kind of rows, counts of rows, and poses without an
-//! equilibrium.
+//! Errors in words: names of arms, labels and units by kind of rows, counts of rows, and poses
+//! without an equilibrium.
 
 use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::observation::kind_named;
@@ -40,13 +40,9 @@ pub(super) fn unit(of: &ErrorSummary) -> &'static str {
     of.unit().in_tables().symbol
 }
 
-/// Returns one of three table headers, that for the unit of the errors: mm, ° or px.
-pub(super) fn header(of: &ErrorSummary, [mm, degrees, px]: [&'static str; 3]) -> &'static str {
-    match of.unit() {
-        Unit::Angle => degrees,
-        Unit::Pixel => px,
-        _ => mm,
-    }
+/// Returns a table header with the unit of the errors after it.
+pub(super) fn with_unit_of(of: &ErrorSummary, words: &str) -> String {
+    format!("{words}, {}", unit(of))
 }
 
 /// Formats the mean, rms and largest error length.
@@ -150,3 +146,10 @@ pub(super) fn without_equilibrium(of: &ErrorSummary, poses: &str) -> String {
         counted(of.n, &format!("{poses} pose"))
     )
 }
+
+/// Name of the nominal arm, with base and tool fitted if these are free.
+pub(super) const NOMINAL_ARM: &str = "nominal arm";
+/// Name of the fitted arm of the declared problem.
+pub(super) const DECLARED_ARM: &str = "as declared, fitted";
+/// Name of the arm of the extended problem.
+pub(super) const EXTENDED_ARM: &str = "with what was found";

@@ -218,17 +218,14 @@ fn comparison_blocks<'a>(
         vec![name.to_owned(), mean, rms, max]
     };
     let listed = [("whole model", whole)].into_iter().chain(geometries);
-    let heading = match (*are_held_out, unit) {
-        (true, "mm") => "held-out error, mm",
-        (true, "°") => "held-out error, °",
-        (true, _) => "held-out error, px",
-        (false, "mm") => "error of fitted rows, mm",
-        (false, "°") => "error of fitted rows, °",
-        (false, _) => "error of fitted rows, px",
-    };
+    let heading = if *are_held_out { "held-out error" } else { "error of fitted rows" };
     let rows = listed.map(|entry| row(&entry)).collect();
     vec![
         Block::Text(verdict),
-        Block::Table(Table::new(&[heading, "mean", "rms", "max"], rows, &[0])),
+        Block::Table(Table::new(
+            &[&format!("{heading}, {unit}"), "mean", "rms", "max"],
+            rows,
+            &[0],
+        )),
     ]
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Table, last_parts};
 use super::figures::{ACCENT, Drawing, FAINT, Forest, INK, WARM};
-use super::render::{page, text};
+use super::render::Story;
 use crate::life::{Fleet, FleetArm, FleetParameter};
 use crate::quantity::format::{counted, number, or_dash, two_digits};
 
@@ -15,17 +15,8 @@ const ARM_HEADER: [&str; 4] = ["arm", "", "deviates most in", "sigmas"];
 /// Maximum number of decimals of a deviation.
 const MAX_DECIMALS: usize = 5;
 
-/// Returns the fleet as text, ending in a line break.
-pub fn fleet_text(fleet: &Fleet) -> String {
-    text(&blocks(fleet))
-}
-
-/// Returns the fleet as a page, with its arms and parameters drawn.
-pub(crate) fn fleet_page(fleet: &Fleet) -> String {
-    page(&fleet.problem, "fleet", &blocks(fleet))
-}
-
-fn blocks<'a>(fleet: &Fleet) -> Vec<Block<'a>> {
+/// Returns the fleet, with its arms and parameters drawn.
+pub(crate) fn fleet(fleet: &Fleet) -> Story {
     let unlike = fleet.arms.iter().filter(|arm| arm.is_unlike).count();
     let verdict = match unlike {
         0 => "no arm is unlike the others".to_owned(),
@@ -41,12 +32,13 @@ fn blocks<'a>(fleet: &Fleet) -> Vec<Block<'a>> {
     let notes = [
         "deviations from nominal; spread: 1 σ of the next arm about the mean; data sheet: declared 1 σ",
     ];
-    vec![
+    let blocks = vec![
         Block::lines(head),
         Block::figures([draw_arms(fleet), draw_parameters(fleet)]),
         Block::Table(Table::new(&PARAMETER_HEADER, parameters, &[0]).noted(&notes)),
         Block::Table(Table::new(&ARM_HEADER, arms, &[0, 1, 2])),
-    ]
+    ];
+    Story::new(&fleet.problem, "fleet", blocks)
 }
 
 /// Draws the largest deviation of each arm from the other arms.

@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Column, Point, Table, split_at_most};
-use super::errors::header;
-use super::probability::percent;
+use super::document::{Block, Column, Point, Table, percent, split_at_most};
+use super::errors::with_unit_of;
 use super::verdict::{alternative, has_place, stand_in_sentence, title};
 use super::{effect, figures, trace};
 use crate::problem::Effect;
@@ -117,16 +116,15 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
         let words = parts.into_iter().flatten().collect::<Vec<_>>().join(" – ");
         if words.is_empty() { "no change".to_owned() } else { words }
     };
-    let error = |name, of: fn(&Step) -> f64| {
+    let error = |name: &str, of: fn(&Step) -> f64| {
         Column::number(name, move |(_, step): &(usize, &Step)| number(of(step), 4))
     };
-    let rms = ["identification rms, mm", "identification rms, °", "identification rms, px"];
-    let rms = header(&closure.after.fitted.held_out, rms);
+    let rms = with_unit_of(&closure.after.fitted.held_out, "identification rms");
     let steps: Vec<(usize, &Step)> = (1..).zip(&result.steps).collect();
     let columns = [
         Column::number("round", |(round, _): &(usize, &Step)| round.to_string()),
         Column::words("change of the model", change),
-        error(rms, |step| step.errors.identification.norms().0[1]),
+        error(&rms, |step| step.errors.identification.norms().0[1]),
         error("held out mean", |step| step.errors.judged().norms().0[0]),
         error("held out rms", |step| step.errors.judged().norms().0[1]),
     ];
@@ -163,8 +161,7 @@ pub(super) fn status_table<'a>(closure: &ClosedLoop, result: &LoopResult) -> Opt
                     the poses that find the effect"
         .to_owned();
     if has_own_errors(result) {
-        let mean = ["held out mean, mm", "held out mean, °", "held out mean, px"];
-        let mean = header(&closure.after.fitted.held_out, mean);
+        let mean = with_unit_of(&closure.after.fitted.held_out, "held out mean");
         let error = |found: &FoundEffect| number(found.held_out_after.norms().0[0], 4);
         columns.push(Column::number(mean, error));
         note.push_str(

@@ -1,14 +1,12 @@
-//! Texts of the command `identify`: full text (`--verbose`), and report on one fit.
+//! Texts of the command `identify`: full text (`--verbose`), and report on one fit, with its active
+//! limits.
 
-use super::arm_names::NOMINAL_ARM;
 use super::document::{Block, Headline, Table};
 use super::errors::{
-    axis_count, brief, error_label, format_error, held_out_rows, rows_of, test_rows_word, unit,
-    unpredicted,
+    NOMINAL_ARM, axis_count, brief, error_label, format_error, held_out_rows, rows_of,
+    test_rows_word, unit, unpredicted,
 };
-use super::figures;
-use super::limits::{active_limits, alternation};
-use super::noise::{influential_rows, noise, outliers, residual_fact};
+use super::noise::{influential_rows, noise, outcome, outliers, residual_fact};
 use super::parameters::{
     against_priors, conditioning, correlations, more_unidentifiable, parameters, unidentifiable,
     weak,
@@ -16,14 +14,16 @@ use super::parameters::{
 use super::prior::prior;
 use super::remainder::{PredictionAccuracy, why_no_bound};
 use super::render::{Report, report, text};
-use super::residual_tests;
 use super::row_kinds::row_kind_tables;
-use super::trust::outcome;
+use super::{figures, residual_tests};
 use crate::fit::{
-    ErrorSummary, Errors, Finding, FindingCode, Identification, JointSources, OrientationErrors,
+    ActiveConstraint, Alternation, ErrorSummary, Errors, Estimate, Finding, FindingCode,
+    Identification, JointSources, OrientationErrors, ShadowPrice,
 };
+use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
-use crate::quantity::format::{counted, mm, number};
+use crate::quantity::Unit;
+use crate::quantity::format::{counted, decimals, mm, number, two_digits};
 use crate::results::{PlotData, nominal_arm, rows_in};
 
 /// Name of the file with the complete result.
@@ -393,4 +393,43 @@ pub(super) fn rms_and_largest(errors: &ErrorSummary) -> String {
     let [rms, max] = [errors.rms.norm, errors.max.norm]
         .map(|value| format!("{} {}", brief(errors, value), unit(errors)));
     format!("rms {rms}, largest {max}")
+}
+
+/// Lists active bounds and constraints with their shadow prices; `None` if there are none.
+pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
+    let line = |name: &str, price: ShadowPrice, unit: Unit| {
+        let (fall, per) = price.in_mm(unit);
+        format!("{name}: {} mm for 1 {per}", two_digits(fall, 6))
+    };
+    let bound = |estimate: &Estimate| {
+        let side = if estimate.at_bound? == AtBound::Lower { "lower" } else { "upper" };
+        let name = format!("{}, {side} bound", estimate.name);
+        Some(line(&name, estimate.shadow_price?, estimate.unit))
+    };
+    let constraint = |active: &ActiveConstraint| {
+        let place = active.location.line.map_or_else(String::new, |line| format!("line {line}: "));
+        line(&format!("{place}{}", active.words), active.shadow_price, active.unit)
+    };
+    let bounds = found.estimates.iter().filter_map(bound);
+    let points: Vec<String> =
+        bounds.chain(found.active_constraints.iter().map(constraint)).collect();
+    let words = "Active limits and their cost: decrease of the rms residual if the limit is moved outwards \
+                 by the stated amount\n(standard errors hold with these limits kept):"
+        .to_owned();
+    (!points.is_empty()).then_some(Block::Lines(words, points))
+}
+
+/// States the number of sweeps of a sequential strategy, and the rate of convergence without
+/// acceleration; `None` for strategies without alternating stages.
+pub(super) fn alternation<'a>(found: &Identification) -> Option<Block<'a>> {
+    let Alternation { sweeps, contraction } = found.alternation?;
+    let slow = contraction.map_or_else(String::new, |rate| {
+        format!(
+            "; without acceleration each sweep would leave {} of the error",
+            number(rate, decimals(1.0 - rate, 6))
+        )
+    });
+    Some(Block::lines(format!(
+        "Stiffness and geometry alternated in {sweeps} accelerated sweeps{slow}."
+    )))
 }

@@ -5,7 +5,6 @@
 //! of pages.
 
 mod acceptance;
-mod arm_names;
 mod brief;
 mod candidates;
 mod check;
@@ -25,9 +24,6 @@ mod forecast;
 mod found_effects;
 mod identify;
 mod init;
-mod limited_poses;
-mod limits;
-mod misplaced;
 mod next;
 mod noise;
 mod paper_tables;
@@ -35,61 +31,55 @@ mod parameters;
 mod plan;
 mod predict;
 mod prior;
-mod probability;
 mod remainder;
 mod render;
 mod replica;
 mod residual_tests;
 mod row_kinds;
-mod separation;
 mod shell;
 mod study;
 mod trace;
-mod trust;
 mod unexplained;
 mod verdict;
 mod watch;
 
 pub(crate) use acceptance::{acceptance_page, acceptance_text, tolerance_text};
 pub(crate) use brief::{determines_nothing, estimate_brief};
-pub(crate) use check::check_page;
 pub use closed_loop::{loop_report, loop_text};
-pub(crate) use difference::{HeldOutRow, Side, difference_page, difference_text, predicts_better};
-pub(crate) use fleet::{fleet_page, fleet_text};
+pub(crate) use difference::{HeldOutRow, Side, difference, predicts_better};
+pub(crate) use fleet::fleet;
 pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};
 pub(crate) use init::init_text;
-pub(crate) use next::next_page;
 pub(crate) use noise::influential_rows_advice;
-pub(crate) use plan::plan_page;
-pub(crate) use predict::{prediction_page, prediction_text};
+pub(crate) use predict::prediction;
 #[doc(hidden)]
 pub use remainder::PredictionAccuracy;
+pub(crate) use remainder::remainder_paragraph;
 pub use render::Report;
 #[doc(hidden)]
-pub use render::{limit_text_width, text_width};
+pub use render::{Story, limit_text_width, text_width};
 pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
-pub(crate) use study::study_page;
-pub(crate) use trace::{names_cause, trace_page};
+pub(crate) use trace::names_cause;
 pub(crate) use unexplained::lacks_masses;
 pub(crate) use verdict::interrupted;
-pub(crate) use watch::{watch_page, watch_text};
+pub(crate) use watch::watch;
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
-    check::{check_text, why_not_sufficient},
+    check::{check, why_not_sufficient},
     closed_loop::loop_brief,
     closed_problem::closed_problem,
     compare::{compare_text, comparison_report},
+    compensate::Doubts,
     compensate::commands_text,
     export::{ExportRemarks, better_geometry, export_text, kept_at_end, set_up_comment},
     figures::is_figure,
     identify::why_not_trusted,
-    misplaced::Doubts,
-    next::next_text,
-    plan::plan_text,
+    next::next,
+    plan::plan,
     remainder::remainder_text,
-    study::study_text,
-    trace::trace_text,
+    study::study,
+    trace::trace,
 };

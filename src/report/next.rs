@@ -1,10 +1,9 @@
 //! Text and page of the command `next`: the poses to measure next, or that there are enough.
 
-use super::candidates::{candidates_drawn, few_in_view};
+use super::candidates::{at_limits, candidates_drawn, few_in_view};
 use super::document::{Block, Table, code, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
-use super::limited_poses::at_limits;
-use super::render::{page, text};
+use super::render::Story;
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
 use crate::fit::Noise;
 use crate::measurement::Measurements;
@@ -12,17 +11,8 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number, or_dash};
 use crate::results::{CommandedJoint, commanded_joints, pose_columns};
 
-/// Returns the text of a choice of poses, ending in a line break.
-pub fn next_text(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
-    text(&blocks(problem, options, next))
-}
-
-/// Returns the page of a choice of poses, with a figure of the error expected after each of them.
-pub(crate) fn next_page(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
-    page(&problem.title, "next poses", &blocks(problem, options, next))
-}
-
-fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec<Block<'a>> {
+/// Returns a choice of poses, with a figure of the error expected after each of them.
+pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story {
     let percent = number(options.level * 100.0, 1);
     let percent = percent.trim_end_matches(".0");
     let counts = format!(
@@ -55,7 +45,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
             Block::Table(command_table(problem, &next.poses)),
         ]));
     }
-    blocks
+    Story::new(&problem.title, "next poses", blocks)
 }
 
 /// States the error in the workspace with its bound, which holds with a probability of `percent` %,

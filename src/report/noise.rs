@@ -1,11 +1,12 @@
-//! Sentences about outliers, influential rows, and the size of the residual relative to the
-//! declared σ.
+//! Sentences about outliers, influential rows, the size of the residual relative to the declared σ,
+//! and whether a fit is to be trusted.
 
 use std::path::Path;
 
 use super::document::{Block, first_of, joined};
-use super::errors::{brief, row_noun, unit, with_unit};
-use crate::fit::{Identification, Noise, Outlier, TypicalScatter, size_of_kind};
+use super::errors::{brief, row_noun, test_rows_word, unit, with_unit};
+use super::remainder::PredictionAccuracy;
+use crate::fit::{FindingCode, Identification, Noise, Outlier, TypicalScatter, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, mm, number};
 use crate::results::{ResidualSize, rows_in};
@@ -175,6 +176,9 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
     let (n, all) =
         (found.outliers.len(), rows_in(found, |errors| errors.identification) + known_distances);
     let point = |outlier: &Outlier| {
+        let from = |size: f64, source: &str| {
+            format!(" ({}, from {source})", size_of_kind(outlier.kind, size, 3))
+        };
         let note = if outlier.kind == "known distance" { " (known distance)" } else { "" };
         format!(
             "{}{note}: {}, {} × the typical scatter{}",
@@ -185,7 +189,8 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
                 Some(_) if includes_orientation(found, outlier.kind) => {
                     " of position and orientation together".to_owned()
                 }
-                Some(scatter) => scatter_size(outlier.kind, scatter),
+                Some(TypicalScatter::Median(size)) => from(size, "the median"),
+                Some(TypicalScatter::Declared(size)) => from(size, "the σ that the fit assumes"),
                 None => String::new(),
             }
         )
@@ -221,16 +226,6 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
 /// the typical scatter is no length.
 pub(super) fn includes_orientation(found: &Identification, kind: &str) -> bool {
     found.orientation.is_some() && kind == "position"
-}
-
-/// States the size of the typical scatter for rows of a kind, and its source: " (0.197 mm, from the
-/// median)".
-fn scatter_size(kind: &str, scatter: TypicalScatter) -> String {
-    let (size, source) = match scatter {
-        TypicalScatter::Median(size) => (size, "the median"),
-        TypicalScatter::Declared(size) => (size, "the σ that the fit assumes"),
-    };
-    format!(" ({}, from {source})", size_of_kind(kind, size, 3))
 }
 
 /// Names the influential rows and states the size of the residual without them; `None` if there are
@@ -282,4 +277,67 @@ pub(super) fn residual_fact(term: &'static str, found: &Identification) -> (&'st
         _ => "cannot be judged".to_owned(),
     };
     (term, size)
+}
+
+/// Codes of warnings that contradict a trusted fit or its predictions, so that its headline names
+/// reservations.
+const RESERVATIONS: [FindingCode; 3] =
+    [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutNotBetter, FindingCode::RowsChanged];
+
+/// States whether the fit is to be trusted, the held-out error before and after it, and how much
+/// its residual exceeds the declared noise.
+pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccuracy>) -> String {
+    if let Some(reason) = found.first_error() {
+        return format!("Not to be trusted: {reason}.");
+    }
+    let [before, fitted] = [&found.registered, &found.fitted].map(|errors| &errors.held_out);
+    let corrected = accuracy.and_then(|accuracy| accuracy.corrected.as_ref());
+    let after = corrected.unwrap_or(fitted);
+    let is_larger = match ResidualSize::of(found) {
+        ResidualSize::Contradicted(chi2) | ResidualSize::Unclear(chi2) => chi2 > 1.0,
+        _ => false,
+    };
+    if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
+        return "The fit is to be trusted.".to_owned();
+    }
+    let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
+    let is_raised = raised_sigma_ratio(found).is_some();
+    let scope =
+        if (is_larger || is_raised) && has_bound { " within the error bound below" } else { "" };
+    let is_reserved =
+        is_raised || found.cautions().any(|caution| RESERVATIONS.contains(&caution.code));
+    let reserved = if is_reserved { ", with reservations (see the warnings)" } else { "" };
+    let size = if found.noise_factor > 1.0 {
+        format!("{} × the declared σ", number(found.noise_factor.sqrt(), 1))
+    } else {
+        "larger than the declared σ explains".to_owned()
+    };
+    let of = if corrected.is_some() { " without the remainder" } else { "" };
+    let without = if corrected.is_some() {
+        format!(" ({} without the remainder)", with_unit(fitted, fitted.mean.norm))
+    } else {
+        String::new()
+    };
+    let [from, to] = [with_unit(before, before.mean.norm), with_unit(after, after.mean.norm)];
+    let change = if from == to {
+        format!("stays at {to}")
+    } else if after.mean.norm < before.mean.norm {
+        format!("falls from {from} to {to}")
+    } else {
+        format!("does not fall: it goes from {from} to {to}")
+    };
+    format!(
+        "Trusted{scope}{reserved}: the mean {} error {change}{without}.{}",
+        test_rows_word(&found.fitted).replace(' ', "-"),
+        if is_larger {
+            format!(" Not fully explained: the residual{of} is {size}.")
+        } else if let Some(ratio) = raised_sigma_ratio(found) {
+            format!(
+                " Not fully explained: the new rows contradict the prior, so the fit assumes {} × the declared σ.",
+                number(ratio, 1)
+            )
+        } else {
+            String::new()
+        }
+    )
 }

@@ -1,15 +1,13 @@
 //! Text and page of the command `plan`: the poses to measure and the accuracy that they are
 //! expected to give.
 
-use super::candidates::candidates_drawn;
+use super::candidates::{at_limits, candidates_drawn};
 use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Drawing, Forest};
-use super::forecast::{assumptions, cells};
-use super::limited_poses::at_limits;
+use super::forecast::{assumptions, cells, separation_blocks};
 use super::next::command_table;
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
-use super::render::{page, text};
-use super::separation;
+use super::render::Story;
 use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
@@ -41,33 +39,14 @@ fn sufficiency<'a>(plan: &Plan) -> Block<'a> {
     ))
 }
 
-/// Returns the plan as text, ending in a line break; `separated` is given if the plan is to
-/// distinguish two effects.
-pub fn plan_text(
+/// Returns the plan, with a figure of the gain over random poses; `separated` is given if the plan is
+/// to distinguish two effects.
+pub fn plan(
     problem: &Problem,
     criterion: &Criterion,
     plan: &Plan,
     separated: Option<&PairSeparation>,
-) -> String {
-    text(&blocks(problem, criterion, plan, separated))
-}
-
-/// Returns the plan as a page, with a figure of the gain over random poses.
-pub(crate) fn plan_page(
-    problem: &Problem,
-    criterion: &Criterion,
-    plan: &Plan,
-    separated: Option<&PairSeparation>,
-) -> String {
-    page(&problem.title, "plan", &blocks(problem, criterion, plan, separated))
-}
-
-fn blocks<'a>(
-    problem: &Problem,
-    criterion: &Criterion,
-    plan: &Plan,
-    separated: Option<&'a PairSeparation>,
-) -> Vec<Block<'a>> {
+) -> Story {
     let planned = &plan.planned;
     let (poses, given) = (plan.poses.len(), plan.given);
     let besides =
@@ -120,12 +99,12 @@ fn blocks<'a>(
     // Rows of a camera's table are points, not poses.
     let fitted = (!plan.is_of_cameras || given == 0).then_some(poses + given);
     blocks.extend(assumptions(problem, &planned.expected, fitted));
-    blocks.extend(separated.map(separation::blocks).unwrap_or_default());
+    blocks.extend(separated.map(separation_blocks).unwrap_or_default());
     blocks.push(Block::Page(vec![
         Block::heading("The planned poses"),
         Block::Table(command_table(problem, &plan.poses)),
     ]));
-    blocks
+    Story::new(&problem.title, "plan", blocks)
 }
 
 /// Returns the letter of a criterion with the quantity that it minimises.

@@ -6,7 +6,7 @@ use super::document::{Block, Table, opening};
 use super::errors::{error_label, mean_rms_max};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series, WARM};
 use super::remainder::bound_sentence;
-use super::render::{page, text};
+use super::render::Story;
 use super::row_kinds::unsteady_points;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::problem::Problem;
@@ -18,33 +18,15 @@ use crate::remainder::{BoundTest, Bounds};
 /// `None` if there are no such rows.
 pub(crate) type Tested<'a> = (&'a Bounds, Option<&'a BoundTest>);
 
-/// Returns the predictions as text. `arm` describes the arm that was used, and `fitted` lists the
-/// predicted rows (from 0, ascending) to which that arm was fitted.
-pub fn prediction_text(
+/// Returns the predictions, with a figure of the errors of measured rows. `arm` describes the arm
+/// that was used, and `fitted` lists the predicted rows (from 0, ascending) to which that arm was
+/// fitted.
+pub(crate) fn prediction(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
     (bounds, fitted): (Option<Tested>, &[usize]),
-) -> String {
-    text(&blocks(problem, arm, prediction, (bounds, fitted)))
-}
-
-/// Returns the predictions as a page, with a figure of the errors of measured rows.
-pub(crate) fn prediction_page(
-    problem: &Problem,
-    arm: &str,
-    prediction: &Prediction,
-    (bounds, fitted): (Option<Tested>, &[usize]),
-) -> String {
-    page(&problem.title, "predictions", &blocks(problem, arm, prediction, (bounds, fitted)))
-}
-
-fn blocks<'a>(
-    problem: &Problem,
-    arm: &str,
-    prediction: &Prediction,
-    (bounds, fitted): (Option<Tested>, &[usize]),
-) -> Vec<Block<'a>> {
+) -> Story {
     let mut words = format!("{} predicted for {arm}", counted(prediction.positions.len(), "pose"));
     let lost = prediction
         .positions
@@ -94,7 +76,7 @@ fn blocks<'a>(
         blocks.push(Block::list(unsteady));
     }
     blocks.push(Block::figures([draw_errors(prediction, bounds.map(|(bounds, _)| bounds))]));
-    blocks
+    Story::new(&problem.title, "predictions", blocks)
 }
 
 /// Returns true if all predicted rows measure positions; false if they contain no measurements.

@@ -61,7 +61,8 @@ fn draw(comparison: &PriorComparison) -> Option<Drawing> {
 pub(super) fn summary(comparison: &PriorComparison) -> String {
     let mut text = format!("Prior: {}", comparison.file.display());
     if comparison.days > 0.0 {
-        let _ = write!(text, ", widened by the drift of {}", format_days(comparison.days));
+        let plural = if comparison.days > 1.0 { "s" } else { "" };
+        let _ = write!(text, ", widened by the drift of {} day{plural}", comparison.days);
     }
     if comparison.left_out > 0 {
         let rows = counted(comparison.left_out, "row");
@@ -93,10 +94,6 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
         }
     };
     text + &verdict
-}
-
-fn format_days(days: f64) -> String {
-    format!("{days} {}", if days > 1.0 { "days" } else { "day" })
 }
 
 fn row(compared: &ComparedParameter) -> Vec<String> {

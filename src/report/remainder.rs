@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Column, Table, code};
 use super::figures;
+use super::render::text_width;
 use crate::fit::{ErrorSummary, Identification, Residual};
 use crate::quantity::format::{counted, mm, number, percent_of, two_digits};
 use crate::remainder::{BoundTest, Bounds, Carried, Gain, JointError, MIN_CONFIGURATIONS, Outcome};
@@ -60,6 +61,11 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
             number(Gain::least_evidence(), 2),
         ),
     }
+}
+
+/// Returns the sentences on a remainder as a paragraph of a screen.
+pub(crate) fn remainder_paragraph(found: &Identification, outcome: &Outcome) -> String {
+    format!("\n{}\n", textwrap::fill(&remainder_text(found, outcome), text_width()))
 }
 
 /// States what was carried over from an earlier estimate, and which new rows conditioned it.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Column, Table, opening};
 use super::figures::{Drawing, Forest, INK};
-use super::render::{page, text};
+use super::render::Story;
 use crate::quantity::format::{number, or_dash};
 use crate::results::{Cell, StudyResult};
 use crate::study::{Results, Source, Study};
@@ -12,17 +12,8 @@ use crate::study::{Results, Source, Study};
 /// Cell of a study with the median duration of a fit \[s\].
 type TimedCell = (Cell, f64);
 
-/// Returns the study as text, ending in a line break.
-pub fn study_text(study: &Study, results: &Results) -> String {
-    text(&blocks(study, results))
-}
-
-/// Returns the study as a page, with a figure of the error of each cell.
-pub(crate) fn study_page(study: &Study, results: &Results) -> String {
-    page(&study.title, "study", &blocks(study, results))
-}
-
-fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
+/// Returns the study, with a figure of the error of each cell.
+pub fn study(study: &Study, results: &Results) -> Story {
     let by = match study.source {
         Source::Model => "simulated with the model itself",
         Source::Rig => "measured by the virtual test rig",
@@ -71,7 +62,14 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
     ]);
     let [titled, untitled] = opening(&study.title, head);
     let conclusion = Block::lines(conclusion(&cells));
-    vec![titled, untitled, conclusion, Block::Table(table), Block::figures([draw_errors(&cells)])]
+    let blocks = vec![
+        titled,
+        untitled,
+        conclusion,
+        Block::Table(table),
+        Block::figures([draw_errors(&cells)]),
+    ];
+    Story::new(&study.title, "study", blocks)
 }
 
 /// States the cell with the smallest rms error of held-out poses, and the cells without a fit that

@@ -3,11 +3,10 @@
 use std::fmt::Write as _;
 
 use super::detection::has_no_mass;
-use super::document::{Block, Point, joined, opening};
+use super::document::{Block, MIN_PROBABLE, Point, joined, opening, percent};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::format_chi2;
-use super::probability::{MIN_PROBABLE, percent};
-use super::render::{page, text};
+use super::render::Story;
 use super::verdict::declared;
 use super::{effect, figures, residual_tests};
 use crate::fit::Identification;
@@ -16,10 +15,9 @@ use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::{counted, number, p_value};
 use crate::results::{
-    Candidate, Claims, Confounded, Hypothesis, HypothesisSet, PlotData, SeparatingPose, Summary,
-    TraceResult, at_place,
+    Candidate, Claims, CommandedJoint, Confounded, Hypothesis, HypothesisSet, PlotData,
+    SeparatingPose, Summary, TraceResult, at_place, commanded_joints,
 };
-use crate::results::{CommandedJoint, commanded_joints};
 use crate::select::Trace;
 
 /// Maximum number of candidates that a text lists.
@@ -29,17 +27,9 @@ const MAX_SHOWN_SETS: usize = 4;
 /// Maximum number of confounded effects that are named for a candidate.
 const MAX_SHOWN_CONFOUNDED: usize = 3;
 
-/// Returns the result of the command `trace` as text, ending in a line break.
-pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
-    text(&blocks(problem, trace, None))
-}
-
-/// Returns the result as a page, with figures of the ranking and of the residuals in `plots`.
-pub(crate) fn trace_page(problem: &Problem, trace: &Trace, plots: &PlotData) -> String {
-    page(&problem.title, "trace", &blocks(problem, trace, Some(plots)))
-}
-
-fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec<Block<'a>> {
+/// Returns the result of the command `trace`; with `plots`, its page has figures of the ranking and
+/// of the residuals.
+pub fn trace(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Story {
     let result = TraceResult::new(problem, trace);
     let mut blocks = opening(&problem.title, headline(&trace.fit)).to_vec();
     blocks.push(Block::Text(verdict(&result)));
@@ -59,7 +49,7 @@ fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec
         ])
     }));
     blocks.extend(undetectable_effects(problem, trace));
-    blocks
+    Story::new(&problem.title, "trace", blocks)
 }
 
 fn headline(fit: &Identification) -> String {
@@ -133,33 +123,19 @@ fn has_cause(alike: &[&HypothesisSet]) -> bool {
     alike.iter().any(|set| !set.hypotheses.is_empty())
 }
 
-/// Joins the causes of one explanation, with numbers if there are several: "(1) …, (2) …".
-fn numbered(causes: &[String]) -> String {
-    match causes {
-        [cause] => cause.clone(),
-        causes => {
-            let entries = causes.iter().zip(1..).map(|(cause, k)| format!("({k}) {cause}"));
-            entries.collect::<Vec<_>>().join(", ")
-        }
-    }
-}
-
-/// Returns the sets that differ from `set` only in values of searched arguments, such as the
-/// distance of a friction law, or in the order of factors in formulas; `set` is one of them.
-fn sets_alike<'a>(sets: &'a [HypothesisSet], set: &HypothesisSet) -> Vec<&'a HypothesisSet> {
-    let of = |other: &&HypothesisSet| {
-        let mut left: Vec<&Hypothesis> = set.hypotheses.iter().collect();
-        other.hypotheses.len() == left.len()
-            && other.hypotheses.iter().all(|hypothesis| {
-                let place = left.iter().position(|candidate| candidate.is_alike(hypothesis));
-                place.map(|place| left.remove(place)).is_some()
-            })
-    };
-    sets.iter().filter(of).collect()
+/// Returns true if the sets differ only in values of searched arguments, such as the distance of a
+/// friction law, or in the order of factors in formulas.
+fn are_alike(set: &HypothesisSet, other: &HypothesisSet) -> bool {
+    let mut left: Vec<&Hypothesis> = set.hypotheses.iter().collect();
+    other.hypotheses.len() == left.len()
+        && other.hypotheses.iter().all(|hypothesis| {
+            let place = left.iter().position(|candidate| candidate.is_alike(hypothesis));
+            place.map(|place| left.remove(place)).is_some()
+        })
 }
 
 fn total_probability(sets: &[&HypothesisSet]) -> f64 {
-    sets.iter().map(|set| set.probability).fold(0.0, |sum, probability| sum + probability)
+    sets.iter().map(|set| set.probability).sum()
 }
 
 /// Describes the causes of the first of some sets that differ only in values of searched
@@ -183,10 +159,14 @@ fn causes_of(alike: &[&HypothesisSet], result: &TraceResult) -> String {
         }
     };
     let causes: Vec<String> = first.hypotheses.iter().map(words).collect();
-    match (causes.is_empty(), result.size_alone()) {
-        (false, _) => numbered(&causes),
-        (true, None) => "noise alone".to_owned(),
-        (true, Some(_)) => "noise alone, larger than the declared σ".to_owned(),
+    match causes.as_slice() {
+        [] if result.size_alone().is_some() => "noise alone, larger than the declared σ".to_owned(),
+        [] => "noise alone".to_owned(),
+        [cause] => cause.clone(),
+        causes => {
+            let entries = causes.iter().zip(1..).map(|(cause, k)| format!("({k}) {cause}"));
+            entries.collect::<Vec<_>>().join(", ")
+        }
     }
 }
 
@@ -195,8 +175,9 @@ fn causes_of(alike: &[&HypothesisSet], result: &TraceResult) -> String {
 fn groups_of_sets(result: &TraceResult) -> Vec<Vec<&HypothesisSet>> {
     let mut groups: Vec<Vec<&HypothesisSet>> = Vec::new();
     for set in &result.explanations {
-        if !groups.iter().flatten().any(|listed| std::ptr::eq(*listed, set)) {
-            groups.push(sets_alike(&result.explanations, set));
+        match groups.iter_mut().find(|group| are_alike(group[0], set)) {
+            Some(group) => group.push(set),
+            None => groups.push(vec![set]),
         }
     }
     groups.sort_by(|a, b| total_probability(b).total_cmp(&total_probability(a)));
@@ -217,23 +198,16 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     }
     let mut blocks = vec![Block::heading("Most probable explanations"), Block::list(shown)];
     // The claims are those of the most probable single set.
-    let is_first = |alike: &Vec<&HypothesisSet>| {
-        result.explanations.first().is_some_and(|set| alike.iter().any(|of| std::ptr::eq(*of, set)))
-    };
-    if !result.claims.is_empty() && groups.first().is_some_and(is_first) {
+    let first = &result.explanations[0];
+    if !result.claims.is_empty() && std::ptr::eq(groups[0][0], first) {
         blocks.push(Block::heading(
             "How sure the most probable explanation is: where it acts, what it depends on, and its law",
         ));
-        let beside = |claims: &Claims| {
-            let is_there =
-                |other: &&Hypothesis| other.effect.is_none() && other.place == claims.place.value;
-            let first = result.explanations.first();
-            first.is_some_and(|set| set.hypotheses.iter().any(|other| is_there(&other)))
-        };
         let words = |claims: &Claims| {
+            let mut others = first.hypotheses.iter().filter(|other| other.effect.is_none());
             let is_denied = claims.law.value.is_some()
                 && claims.law.probability < MIN_PROBABLE
-                && beside(claims);
+                && others.any(|other| other.place == claims.place.value);
             if is_denied {
                 claims_text(claims)
                     + " as the only cause there, because a function of unknown law acts at the same place"

@@ -2,8 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::document::code;
-use super::probability::{MIN_PROBABLE, percent};
+use super::document::{MIN_PROBABLE, code, percent};
 use crate::fit::Noise;
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::are_all_fixed;
@@ -61,7 +60,12 @@ pub(super) fn to_declare(
             code("position_sigma_mm")
         ));
     }
-    declarations.extend(wrong_limits(result).map(|(limit, probability)| {
+    let limits = result.structures().filter_map(|left| {
+        let probability = left.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
+        Some((left.limit.as_deref()?, probability))
+    });
+    let wrong_limits = limits.filter(|(_, probability)| *probability >= MIN_PROBABLE);
+    declarations.extend(wrong_limits.map(|(limit, probability)| {
         format!(
             "Check the limit {limit}, at which the fit stops: with probability {} it is wrong, or it restrains a parameter that stands \
              in for something the model lacks. Widen it if it may be wrong.",
@@ -180,17 +184,6 @@ pub(crate) fn lacks_masses(result: &LoopResult) -> bool {
 /// Returns true if the structure is the deflection under a weight that is not declared.
 fn is_sag(structure: &Structure) -> bool {
     structure.law.as_deref() == Some("sag")
-}
-
-/// Iterates over limits of the declared problem that are wrong with a probability of at least one
-/// half, with that probability.
-fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
-    let limit =
-        |left: &'_ Structure| left.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
-    result
-        .structures()
-        .filter_map(move |left| Some((left.limit.as_deref()?, limit(left))))
-        .filter(|(_, probability)| *probability >= MIN_PROBABLE)
 }
 
 /// Describes one structure: its place, the quantities that it depends on, and their probabilities.

@@ -1,8 +1,7 @@
 //! Sentences about the outcome of a loop: its verdict, and the title of each cause. No sentence
 //! claims more than the status of the cause allows.
 
-use super::document::code;
-use super::probability::{MIN_PROBABLE, percent};
+use super::document::{MIN_PROBABLE, code, percent};
 use crate::quantity::format::{counted, number};
 use crate::results::{AlternativeEffect, FoundEffect, LoopResult, NamedEffect};
 use crate::select::{Status, Verdict};

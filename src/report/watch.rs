@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Table, last_parts, opening};
 use super::figures::{ACCENT, Curve, Drawing, Series};
-use super::render::{page, text};
+use super::render::Story;
 use crate::life::{CauseKind, Change, Watch, WatchedCause};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
@@ -19,17 +19,8 @@ const HEADER: [&str; 5] = ["cause", "probability", "change ± 1 σ", "error left
 /// them.
 const MIN_EXPECTED_P: f64 = 0.01;
 
-/// Returns the verdict as text, ending in a line break.
-pub fn watch_text(problem: &Problem, watch: &Watch) -> String {
-    text(&blocks(problem, watch, None))
-}
-
-/// Returns the verdict as a page, with a figure of the evidence after each of the tested `rows`.
-pub(crate) fn watch_page(problem: &Problem, watch: &Watch, rows: &Measurements) -> String {
-    page(&problem.title, "watch", &blocks(problem, watch, control_chart(watch, rows)))
-}
-
-fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<Block<'a>> {
+/// Returns the verdict, with a figure of the evidence after each of the tested `rows`.
+pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> Story {
     let unit = watch.unit.display(0.0);
     let in_unit = |error: f64| format!("{} {}", two_digits(error * unit.factor, 4), unit.symbol);
     let (chi2, coordinates, p) = watch.chi2;
@@ -66,7 +57,7 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
         number(chi2, 1),
         p_value(p)
     ))]));
-    blocks.push(Block::figures([drawn]));
+    blocks.push(Block::figures([control_chart(watch, rows)]));
     if watch.is_changed() {
         let rows = watch.causes.iter().map(|cause| row(cause, &in_unit)).collect();
         let notes = [
@@ -76,7 +67,7 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
         ];
         blocks.push(Block::Table(Table::new(&HEADER, rows, &[0, 2]).noted(&notes)));
     }
-    blocks
+    Story::new(&problem.title, "watch", blocks)
 }
 
 /// Draws the evidence for a change after each row, with the level of an alarm; `None` for fewer

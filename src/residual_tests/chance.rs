@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma};
 
-use crate::numeric::bisect;
+use crate::numeric::{bisect, whole};
 
 /// Minimum number of draws that must reach a value for their fraction to estimate its probability.
 /// With fewer, the tail is that of a fitted gamma distribution.
@@ -51,7 +51,9 @@ impl Chance {
                 scale * distribution.inverse_cdf(1.0 - level)
             }
             Self::Fisher { distribution, of } => distribution.inverse_cdf(1.0 - level / of),
-            Self::AndersonDarling => anderson_darling_upper(level),
+            Self::AndersonDarling => {
+                bisect(|value| anderson_darling_p(value) > level, (0.0, MAX_STATISTIC), 60).1
+            }
             Self::Drawn(drawn) => drawn.upper(level),
         }
     }
@@ -119,12 +121,7 @@ impl Drawn {
         if level > self.share(MIN_EXCEEDING_DRAWS) {
             let reached = level * (1 + self.values.len()) as f64 - 1.0;
             // The bound is a drawn value, which a whole number of draws reaches.
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "between 0 and the draws"
-            )]
-            let reached = (reached.floor() as usize).clamp(1, self.values.len());
+            let reached = whole(reached).clamp(1, self.values.len());
             self.values[self.values.len() - reached]
         } else {
             self.origin + self.unit * self.tail.inverse_cdf(1.0 - level)
@@ -143,9 +140,4 @@ fn anderson_darling_p(statistic: f64) -> f64 {
         _ if a < 0.6 => curve(0.9177, -4.279, -1.38),
         _ => curve(1.2937, -5.709, 0.0186),
     }
-}
-
-/// Returns the value of A² that is exceeded with probability `level` under normality, by bisection.
-fn anderson_darling_upper(level: f64) -> f64 {
-    bisect(|statistic| anderson_darling_p(statistic) > level, (0.0, MAX_STATISTIC), 60).1
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use super::remainder::BoundSummary;
 use super::summary::{nominal_arm, rows_in};
 use super::tables::commanded_joints;
@@ -120,10 +119,6 @@ impl From<&ToleranceTest> for TestedTolerance {
             poses_to_pass: test.poses_to_pass,
         }
     }
-}
-
-impl Document for AcceptanceResult {
-    const FORMAT: &'static str = "flexcal-acceptance";
 }
 
 /// Input file with its digest.

@@ -7,7 +7,6 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use super::identification::Spread;
 use super::remainder::BoundSummary;
 use super::summary::Summary;
@@ -39,10 +38,6 @@ pub struct PredictionErrors {
     pub coverage_p_value: Option<f64>,
     #[serde(flatten)]
     pub bounds: Option<BoundSummary>,
-}
-
-impl Document for PredictionErrors {
-    const FORMAT: &'static str = "flexcal-errors";
 }
 
 /// Spread of the predicted target over the `n` rows at one point.
@@ -105,10 +100,6 @@ pub struct CompensationResult {
     pub bounds: Option<BoundSummary>,
 }
 
-impl Document for CompensationResult {
-    const FORMAT: &'static str = "flexcal-compensate";
-}
-
 /// Problem file that was written from a URDF.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct InitResult {
@@ -119,10 +110,6 @@ pub struct InitResult {
     /// Moving joints from base to tip.
     pub joints: Vec<String>,
     pub notes: Vec<String>,
-}
-
-impl Document for InitResult {
-    const FORMAT: &'static str = "flexcal-init";
 }
 
 impl CompensationResult {

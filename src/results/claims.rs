@@ -6,7 +6,6 @@ use serde::Serialize;
 use super::effect::EffectKeys;
 use crate::laws::ArgumentKind;
 use crate::problem::Effect;
-use crate::residual_tests::Covariate;
 use crate::select::{self, HypothesisKind, Trace};
 
 /// Hypothesis about a cause: an effect with its law, or a function of unknown law at a place.
@@ -115,8 +114,9 @@ pub(super) fn law_name(law: &HypothesisKind) -> &str {
 
 /// Describes a hypothesis in words; `effect_words` describes an effect.
 fn describe(hypothesis: &select::Hypothesis, effect_words: impl Fn(&Effect) -> String) -> String {
-    let (place, inputs) =
-        (at_place(&hypothesis.site.to_string()), join_with_and(&hypothesis.depends_on));
+    let place = at_place(&hypothesis.site.to_string());
+    let inputs: Vec<String> = hypothesis.depends_on.iter().map(ToString::to_string).collect();
+    let inputs = inputs.join(" and ");
     match &hypothesis.kind {
         HypothesisKind::Effect(effect) => effect_words(effect),
         HypothesisKind::NearHarmonic(1) => {
@@ -163,9 +163,4 @@ pub(crate) fn at_place(place: &str) -> String {
         joint if joint.starts_with("joint ") => format!("at {joint}"),
         other => format!("at the {other}"),
     }
-}
-
-/// Joins the names of quantities by "and".
-fn join_with_and(covariates: &[Covariate]) -> String {
-    covariates.iter().map(ToString::to_string).collect::<Vec<_>>().join(" and ")
 }

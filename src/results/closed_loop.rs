@@ -5,7 +5,6 @@ use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::claims::{Claims, NOWHERE, law_name};
-use super::document::Document;
 use super::effect::{EffectKeys, NamedEffect};
 use super::hints::resembled;
 use super::identification::{FindingKeys, InfluentialRowSet};
@@ -68,10 +67,6 @@ pub struct LoopResult {
     /// Findings of the checks of the last fit.
     #[schemars(with = "Vec<FindingKeys>")]
     pub findings: Vec<Finding>,
-}
-
-impl Document for LoopResult {
-    const FORMAT: &'static str = "flexcal-loop";
 }
 
 /// Fit of a problem.

@@ -4,7 +4,6 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use super::summary::{Errors, Summary};
 use crate::fit::{
     self, Baseline, Comparison, ErrorSummary, Identification, PaperTableEntry, SolverChoice,
@@ -24,10 +23,6 @@ pub struct ComparisonResult {
     pub ablations: Vec<AblatedFit>,
     /// Results in the form of the tables of Chen et al. (2021).
     pub procedures: Vec<Procedure>,
-}
-
-impl Document for ComparisonResult {
-    const FORMAT: &'static str = "flexcal-compare";
 }
 
 /// Fit of one strategy with one solver, or of one procedure of the paper.

@@ -5,7 +5,6 @@ use std::borrow::Cow;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use super::effect::{EffectKeys, Untestable};
 use super::identification::{Combination, Conditioning};
 use crate::design::{self, Check, Criterion, PairSeparation, Plan, Prediction, PredictionPoses};
@@ -37,10 +36,6 @@ pub struct CheckResult {
     pub enough: Option<usize>,
     /// Smallest size of each effect that would be found.
     pub detectable: Detectable,
-}
-
-impl Document for CheckResult {
-    const FORMAT: &'static str = "flexcal-check";
 }
 
 /// Planned poses and the accuracy that they are expected to give.
@@ -78,10 +73,6 @@ pub struct PlanResult {
     /// How well the plan distinguishes two effects; absent if that is not its purpose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation: Option<SeparationResult>,
-}
-
-impl Document for PlanResult {
-    const FORMAT: &'static str = "flexcal-plan";
 }
 
 /// Parameter with the standard error that the measurements are expected to give, SI units.

@@ -7,7 +7,6 @@ use nalgebra::{DVector, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use super::summary::Summary;
 use crate::fit::{ErrorSummary, Placement, SavedEstimate};
 use crate::measurement::Dataset;
@@ -29,10 +28,6 @@ pub struct ExportResult {
     pub fitted: Option<ExportedErrors>,
     /// Parts of the model that the file cannot represent.
     pub not_held: Vec<String>,
-}
-
-impl Document for ExportResult {
-    const FORMAT: &'static str = "flexcal-export";
 }
 
 /// New origin of a joint in a URDF, and its motion from the nominal origin.

@@ -3,7 +3,6 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use crate::life::{Fleet, FleetArm, FleetParameter};
 
 /// Mean and spread of the parameters of arms of one type.
@@ -44,10 +43,6 @@ pub struct FleetArmResult {
     pub parameter: Option<String>,
     /// Deviation of that parameter from the other arms, in its standard deviations.
     pub sigmas: Option<f64>,
-}
-
-impl Document for FleetResult {
-    const FORMAT: &'static str = "flexcal-fleet";
 }
 
 impl FleetResult {

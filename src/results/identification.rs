@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
-use super::document::{Document, json_rows};
+use super::document::json_rows;
 use super::prior::PriorUse;
 use super::remainder::{self, Remainder};
 use super::summary::{Errors, KindErrors, in_mm_deg_px};
@@ -121,11 +121,6 @@ pub(super) struct FindingKeys {
     numbers: BTreeMap<String, serde_json::Value>,
     text: String,
     remedy: String,
-}
-
-impl Document for IdentificationResult {
-    const FORMAT: &'static str = "flexcal-estimate";
-    const IS_READ_BACK: bool = true;
 }
 
 /// Convergence of the sequential strategy, which alternates between stages.

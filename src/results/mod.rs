@@ -26,7 +26,6 @@ mod next;
 pub(crate) mod plots;
 mod prior;
 mod remainder;
-mod residual_size;
 mod residual_test;
 mod study;
 mod summary;
@@ -55,7 +54,7 @@ pub(crate) use plots::{
     sample,
 };
 pub(crate) use remainder::REMAINDER_FILE;
-pub(crate) use residual_size::{ResidualSize, exceeds_noise};
+pub(crate) use residual_test::{ResidualSize, exceeds_noise};
 pub(crate) use study::Cell;
 pub(crate) use summary::{Summary, measured_kinds, nominal_arm, registered_parts, rows_in};
 pub(crate) use tables::{
@@ -90,37 +89,44 @@ pub use self::{
 pub use crate::files::{FORMAT_VERSION, PROGRAM};
 pub(crate) use tables::pose_columns;
 
-/// Returns the name of every format with its JSON Schema.
-#[doc(hidden)]
-pub fn schemas() -> Vec<(&'static str, String)> {
-    macro_rules! schemas {
-        ($($document:ty),+ $(,)?) => { vec![$((<$document>::FORMAT, <$document>::schema())),+] };
-    }
-    let mut schemas = schemas![
-        AcceptanceResult,
-        CheckResult,
-        ComparisonResult,
-        CompensationResult,
-        ExportResult,
-        FleetResult,
-        IdentificationResult,
-        InitResult,
-        LoopResult,
-        MisprintResult,
-        NextResult,
-        PlanResult,
-        PredictionErrors,
-        StudyResult,
-        TraceResult,
-        WatchResult,
-    ];
-    schemas.push((
-        crate::rig::TRUTH_FORMAT,
-        schema_of::<crate::rig::SavedTruth>(crate::rig::TRUTH_FORMAT, false),
-    ));
-    schemas.push((
-        crate::remainder::FORMAT,
-        schema_of::<crate::remainder::SavedRemainder>(crate::remainder::FORMAT, true),
-    ));
-    schemas
+/// Implements [`Document`] for each result with the name of its format, and lists the schemas.
+macro_rules! documents {
+    ($($result:ty: $format:literal $($key:ident)?;)+) => {
+        $(impl Document for $result {
+            const FORMAT: &'static str = $format;
+            $(const $key: bool = true;)?
+        })+
+
+        /// Returns the name of every format with its JSON Schema.
+        #[doc(hidden)]
+        pub fn schemas() -> Vec<(&'static str, String)> {
+            use crate::{remainder, rig};
+            let truth = schema_of::<rig::SavedTruth>(rig::TRUTH_FORMAT, false);
+            let correction = schema_of::<remainder::SavedRemainder>(remainder::FORMAT, true);
+            vec![
+                $(($format, <$result>::schema()),)+
+                (rig::TRUTH_FORMAT, truth),
+                (remainder::FORMAT, correction),
+            ]
+        }
+    };
+}
+
+documents! {
+    AcceptanceResult: "flexcal-acceptance";
+    CheckResult: "flexcal-check";
+    ComparisonResult: "flexcal-compare";
+    CompensationResult: "flexcal-compensate";
+    ExportResult: "flexcal-export";
+    FleetResult: "flexcal-fleet";
+    IdentificationResult: "flexcal-estimate" IS_READ_BACK;
+    InitResult: "flexcal-init";
+    LoopResult: "flexcal-loop";
+    MisprintResult: "flexcal-misprints";
+    NextResult: "flexcal-next";
+    PlanResult: "flexcal-plan";
+    PredictionErrors: "flexcal-errors";
+    StudyResult: "flexcal-study";
+    TraceResult: "flexcal-trace";
+    WatchResult: "flexcal-watch";
 }

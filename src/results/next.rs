@@ -3,7 +3,6 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use super::effect::EffectKeys;
 use crate::design::{self, NextOptions, NextPoses, Purpose, StopReason};
 use crate::problem::{Effect, Problem};
@@ -54,10 +53,6 @@ pub struct NextResult {
     pub effects: Vec<Effect>,
     /// Poses in the order of next.csv.
     pub poses: Vec<NextStep>,
-}
-
-impl Document for NextResult {
-    const FORMAT: &'static str = "flexcal-next";
 }
 
 /// Error measured − predicted over the workspace.

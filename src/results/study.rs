@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use super::summary::Summary;
 use crate::paper::Misprint;
 use crate::study::{
@@ -25,10 +24,6 @@ pub struct StudyResult {
     pub repetitions: usize,
     pub held_out_poses: usize,
     pub cells: Vec<Cell>,
-}
-
-impl Document for StudyResult {
-    const FORMAT: &'static str = "flexcal-study";
 }
 
 /// Results of the fits of one cell: one noise level, number of poses, strategy and solver.
@@ -88,10 +83,6 @@ pub struct MisprintResult {
     pub rigid_leaves_mm: f64,
     pub misprints: Vec<MisprintSize>,
     pub cases: Vec<StudiedCase>,
-}
-
-impl Document for MisprintResult {
-    const FORMAT: &'static str = "flexcal-misprints";
 }
 
 /// Largest change of the end point's position by a misprint.

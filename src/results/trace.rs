@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::claims::{Claims, Hypothesis};
-use super::document::Document;
 use super::effect::{EffectKeys, NamedEffect, Untestable, joined};
 use super::identification::FindingKeys;
 use super::residual_test::{ResidualTest, size_alone};
@@ -46,10 +45,6 @@ pub struct TraceResult {
     /// Findings of the checks of the fit.
     #[schemars(with = "Vec<FindingKeys>")]
     pub findings: Vec<Finding>,
-}
-
-impl Document for TraceResult {
-    const FORMAT: &'static str = "flexcal-trace";
 }
 
 /// Candidate effect in the ranking.

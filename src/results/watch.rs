@@ -5,7 +5,6 @@ use std::borrow::Cow;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::document::Document;
 use crate::life::{Change, Watch, WatchedCause};
 use crate::problem::Problem;
 use crate::quantity::Unit;
@@ -74,10 +73,6 @@ pub struct ChangeResult {
     pub unit: Cow<'static, str>,
     pub change: f64,
     pub std_error: Option<f64>,
-}
-
-impl Document for WatchResult {
-    const FORMAT: &'static str = "flexcal-watch";
 }
 
 impl WatchResult {

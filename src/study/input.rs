@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use crate::error::{InputError, InputErrorKind, StudyErrorKind};
 use crate::problem::Problem;
 use crate::problem::item::{Document, Item};
+use crate::problem::section::Section;
+use crate::quantity::Unit;
 
 /// Largest number of poses, held-out poses or repetitions that a file may state.
 const MAX_COUNT: u64 = 1_000_000;
@@ -30,6 +32,25 @@ pub(super) fn problem_of(
 pub(super) fn path_beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
     let path = folder.join(item.text()?);
     if path.exists() { Ok(path) } else { Err(item.error(StudyErrorKind::FileMissing { path })) }
+}
+
+/// Reads a number above 0.
+pub(super) fn above_zero(item: &Item<'_, '_>) -> Result<f64, InputError> {
+    match item.number()? {
+        value if value > 0.0 => Ok(value),
+        value => Err(item.error(InputErrorKind::NotPositive { value })),
+    }
+}
+
+/// Reads the length above 0 \[m\] that the study must have; `write` is the remedy if it is missing.
+pub(super) fn length(
+    root: &mut Section<'_, '_>,
+    base: &str,
+    write: &str,
+) -> Result<f64, InputError> {
+    let kind = |value| InputErrorKind::NotPositive { value };
+    let length = root.positive(base, Unit::Length, kind)?;
+    length.ok_or_else(|| root.missing(&format!("{base}_mm"), write))
 }
 
 /// Reads a count, at least one and at most [`MAX_COUNT`].

@@ -90,7 +90,8 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     let draws_effects = root.peek("truth").is_none();
     let mut files = [&[file.to_owned(), problem_file], problem.data.files.as_slice()].concat();
     if let Some(item) = root.peek("truth") {
-        files.push(truth_file(path_beside(&item, folder)?));
+        let path = path_beside(&item, folder)?;
+        files.push(if path.is_dir() { path.join("TRUTH.toml") } else { path });
     }
     root.finish()?;
     effects::check(&problem, &truth, source, || {
@@ -124,11 +125,6 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
         cells,
         problem_text,
     })
-}
-
-/// Returns the truth file for a path to it or to its folder.
-fn truth_file(path: PathBuf) -> PathBuf {
-    if path.is_dir() { path.join("TRUTH.toml") } else { path }
 }
 
 /// Reads the source of the measurements; the default is the model.

@@ -8,9 +8,7 @@ use rand::Rng as _;
 use super::definition::{Cell, Source, Study};
 use super::effects::Strengths;
 use super::tally::{Fitted, ParameterScore, Score};
-use crate::fit::{
-    Estimate, FindingCode, Identification, IdentifyError, Options, Placement, identify,
-};
+use crate::fit::{FindingCode, Identification, IdentifyError, Options, Placement, identify};
 use crate::measurement::{Dataset, Labels, Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
@@ -61,7 +59,7 @@ pub(super) fn fit(
 /// Another σ only scales the noise.
 fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
     let truth = study.truth.with_noise(cell.sigma);
-    let seed = repetition_seed(study, repetition);
+    let seed = stream(study.seed, repetition as u64).next_u64();
     let Draw { arm, parameters, mut rows } =
         rig::draw(&study.problem, &truth, study.held_out + cell.poses, seed);
     let strengths = Strengths::draw(study, seed);
@@ -89,11 +87,6 @@ fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
         identification: (study.held_out..rows.len()).collect(),
     };
     Some(Data { dataset: Dataset::new(table(&rows), split), truth: true_x })
-}
-
-/// Returns the seed of one repetition.
-fn repetition_seed(study: &Study, repetition: usize) -> u64 {
-    stream(study.seed, repetition as u64).next_u64()
 }
 
 /// Returns the position that the model predicts in each row for the true arm with the true effect
@@ -189,7 +182,11 @@ fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
     };
     let parameters = study.parameters.iter().zip(&data.truth).map(|(parameter, truth)| {
         let (x, std_error) = match estimate(&parameter.name) {
-            Some((estimate, x)) => (*x, deviation_error(estimate)),
+            Some((estimate, x)) => {
+                // The deviation of a stiffness is a logarithm.
+                let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
+                (*x, estimate.std_error.map(|error| error / scale))
+            }
             None => (0.0, None),
         };
         truth.map(|truth| ParameterScore { error: x - truth, std_error })
@@ -201,11 +198,4 @@ fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
         iterations: identification.iterations,
         parameters: parameters.collect(),
     })
-}
-
-/// Returns the standard error of the deviation x of an estimate, a logarithm for stiffnesses;
-/// `None` if the fit reports none.
-fn deviation_error(estimate: &Estimate) -> Option<f64> {
-    let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
-    estimate.std_error.map(|error| error / scale)
 }

@@ -70,16 +70,12 @@ impl<'a> Chain<'a> {
             Some(name) => (robot.link(name)?, Vec::new()),
             None => leaf(robot, &above, base)?,
         };
-        let name =
-            |link: usize| robot.links.get(link).map_or(String::new(), |link| link.name.clone());
+        let name = |link: usize| robot.link_name(link);
         let (mut joints, mut passed, mut at) = (Vec::new(), Vec::new(), tip);
         while at != base {
             let Some((joint, parent)) = above.get(at).copied().flatten() else {
-                return Err(robot.error(UrdfErrorKind::NotBelow {
-                    base: name(base),
-                    tip: name(tip),
-                    above: passed,
-                }));
+                let (base, tip) = (name(base), name(tip));
+                return Err(robot.error(UrdfErrorKind::NotBelow { base, tip, above: passed }));
             };
             joints.push(joint);
             passed.push(name(parent));
@@ -87,24 +83,15 @@ impl<'a> Chain<'a> {
         }
         joints.reverse();
         if joints.len() > MAX_JOINTS {
-            return Err(
-                robot.error(UrdfErrorKind::TooManyJoints { found: joints.len(), most: MAX_JOINTS })
-            );
+            let (found, most) = (joints.len(), MAX_JOINTS);
+            return Err(robot.error(UrdfErrorKind::TooManyJoints { found, most }));
         }
-        let mut chain = Self {
-            robot,
-            base,
-            tip,
-            joints,
-            stages: Vec::new(),
-            end: Frame::identity(),
-            other_leaves,
-        };
+        let (stages, end) = (Vec::new(), Frame::identity());
+        let mut chain = Self { robot, base, tip, joints, stages, end, other_leaves };
         chain.compute_stages()?;
         if chain.stages.is_empty() {
-            return Err(
-                robot.error(UrdfErrorKind::NothingMoves { base: name(base), tip: name(tip) })
-            );
+            let (base, tip) = (name(base), name(tip));
+            return Err(robot.error(UrdfErrorKind::NothingMoves { base, tip }));
         }
         Ok(chain)
     }
@@ -229,8 +216,7 @@ pub(super) fn moved(frame: &Frame<f64>, joint: &Joint, q: f64) -> Frame<f64> {
 /// the root. A link with two parents and a loop of joints are errors.
 fn parents(robot: &Robot) -> Result<Vec<Option<(usize, usize)>>, InputError> {
     let mut above: Vec<Option<(usize, usize)>> = vec![None; robot.links.len()];
-    let link =
-        |index: usize| robot.links.get(index).map_or(String::new(), |link| link.name.clone());
+    let link = |index: usize| robot.link_name(index);
     for (index, joint) in robot.joints.iter().enumerate() {
         let Some(place) = above.get_mut(joint.child) else { continue };
         if let Some((first, _)) = place.replace((index, joint.parent)) {
@@ -260,10 +246,7 @@ fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputE
         [root] => Ok(root),
         [] => Err(robot.error(UrdfErrorKind::NoLinks)),
         _ => {
-            let roots = roots
-                .iter()
-                .filter_map(|&link| Some(robot.links.get(link)?.name.clone()))
-                .collect();
+            let roots = roots.iter().map(|&link| robot.link_name(link)).collect();
             Err(robot.error(UrdfErrorKind::Roots { roots }))
         }
     }
@@ -297,15 +280,14 @@ fn leaf(
     leaves.sort_by_key(|&(moving, link)| (usize::MAX - moving, link));
     let named = |(moving, link): &(usize, usize)| {
         let plural = if *moving == 1 { "" } else { "s" };
-        Some(format!("{} ({moving} moving joint{plural})", robot.links.get(*link)?.name))
+        format!("{} ({moving} moving joint{plural})", robot.link_name(*link))
     };
     if let [(most, leaf), (second, _), ..] = *leaves.as_slice()
         && most >= MIN_PLAIN_JOINTS
         && 2 * second <= most
     {
-        return Ok((leaf, leaves.iter().skip(1).filter_map(named).collect()));
+        return Ok((leaf, leaves.iter().skip(1).map(named).collect()));
     }
-    let base = robot.links.get(base).map_or(String::new(), |link| link.name.clone());
-    Err(robot
-        .error(UrdfErrorKind::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))
+    let (base, leaves) = (robot.link_name(base), leaves.iter().map(named).collect());
+    Err(robot.error(UrdfErrorKind::Leaves { base, leaves }))
 }

@@ -1,4 +1,4 @@
-//! Conversion of a chain to the text of a problem.
+//! Conversion of a chain to the text of a problem, with the masses of its links.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt::Write as _;
@@ -6,16 +6,14 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::chain::Chain;
+use super::chain::{Chain, moved};
 use super::free::distinguishable_parameters;
 use super::lines::Step;
 use super::notes;
 use super::read::Kind;
-use super::weights::carried_masses;
-use crate::error::InputError;
-use crate::problem::Problem;
-use crate::problem::quoted;
+use crate::error::{InputError, UrdfErrorKind};
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
+use crate::problem::{Problem, quoted};
 use crate::spatial::Frame;
 
 /// Largest magnitude that counts as zero \[rad\] or \[m\]. Right angles written with eleven
@@ -89,8 +87,12 @@ pub(crate) fn describe_measured(
     let name = name(&chain.robot.name);
     let arm = arm_toml(chain, &name, &rows);
     // Only numbers of excessive size cause an error here.
-    let problem = Problem::parse(&arm, Path::new("problem.toml"))
-        .map_err(|error| chain.robot.as_problem(&error))?;
+    let problem = Problem::parse(&arm, Path::new("problem.toml")).map_err(
+        |InputError { location, kind }| {
+            let key = location.key.unwrap_or_default();
+            chain.robot.error(UrdfErrorKind::AsProblem { key, why: kind.to_string() })
+        },
+    )?;
     let free = distinguishable_parameters(&problem, board.is_some())?;
     notes.extend(notes::of_chain(chain));
     let view = board.map_or_else(|| TOOL.to_owned(), |(corners, distance)| view(corners, distance));
@@ -230,11 +232,6 @@ fn number(value: f64) -> String {
     if rounded.is_finite() { (rounded + 0.0).to_string() } else { value.to_string() }
 }
 
-/// Formats a joint limit with at most six decimals.
-fn limit_number(value: f64) -> String {
-    number((value * 1e6).round() / 1e6)
-}
-
 /// Formats an angle \[rad\] in degrees between −180 and 180; right angles are written exactly.
 fn degrees(angle: f64) -> String {
     let within = angle - (angle / TAU).round() * TAU;
@@ -312,7 +309,8 @@ fn arm_toml(chain: &Chain, name: &str, rows: &[Row]) -> String {
             for (key, limit) in
                 [("min", min), ("max", max)].into_iter().filter(|(_, limit)| limit.is_finite())
             {
-                let _ = writeln!(text, "{key}_{unit} = {}", limit_number(limit * scale));
+                let rounded = (limit * scale * 1e6).round() / 1e6;
+                let _ = writeln!(text, "{key}_{unit} = {}", number(rounded));
             }
         }
         for (name, mass, com) in &row.bodies {
@@ -409,4 +407,53 @@ fn data(chain: &Chain, rows: &[Row], has_camera: bool) -> String {
         chain.ends().1
     );
     text
+}
+
+/// Mass of a link of the chain or of a branch of it, with the moving joint that moves it.
+pub(super) struct CarriedMass {
+    /// Index of the last moving joint of the chain before the link, among the stages.
+    pub stage: usize,
+    /// Name of the link.
+    pub name: String,
+    /// Mass of the link \[kg\].
+    pub mass: f64,
+    /// Centre of mass with all joints at zero, frame of the chain's base \[m\].
+    pub at: Vector3<f64>,
+}
+
+/// Returns all links with a mass that the chain's moving joints move, in the order of the joints.
+/// Also returns the names of the other moving joints that they move, which are taken at zero.
+pub(super) fn carried_masses(chain: &Chain) -> (Vec<CarriedMass>, Vec<String>) {
+    let robot = chain.robot;
+    let (mut masses, mut beside) = (Vec::new(), Vec::new());
+    // Each entry is a link with its frame and the stage that moves it, from the base outwards.
+    let mut open = vec![(chain.base, Frame::identity(), None)];
+    while let Some((link, frame, carrier)) = open.pop() {
+        if let (Some(stage), Some(body)) = (carrier, robot.links.get(link))
+            && body.mass > 0.0
+        {
+            masses.push(CarriedMass {
+                stage,
+                name: body.name.clone(),
+                mass: body.mass,
+                at: frame.point(&body.com),
+            });
+        }
+        for (index, joint) in
+            robot.joints.iter().enumerate().filter(|(_, joint)| joint.parent == link)
+        {
+            let mut next = frame.compose(&joint.origin.frame());
+            let stage = chain.stages.iter().position(|stage| stage.joint == index);
+            if let Some(moving) = stage.and_then(|stage| chain.stages.get(stage)) {
+                // A mimic joint may have an offset when its leader is at zero.
+                next = moved(&next.compose(&moving.axis), joint, moving.offset)
+                    .compose(&moving.axis.inverse());
+            } else if joint.kind != Kind::Fixed && carrier.is_some() {
+                beside.push(joint.name.clone());
+            }
+            open.push((joint.child, next, stage.or(carrier)));
+        }
+    }
+    masses.sort_by_key(|link| link.stage);
+    (masses, beside)
 }

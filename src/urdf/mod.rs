@@ -17,8 +17,6 @@ mod notes;
 mod number;
 mod patches;
 mod read;
-mod universal_robots;
-mod weights;
 mod yaml;
 
 pub use chain::Chain;

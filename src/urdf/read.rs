@@ -165,15 +165,14 @@ impl Robot {
         Location::file(&self.source.file).error(kind)
     }
 
-    /// Converts the error of a problem that was made from this URDF to an error about the URDF.
-    pub(super) fn as_problem(&self, error: &InputError) -> InputError {
-        let key = error.location.key.clone().unwrap_or_default();
-        self.error(UrdfErrorKind::AsProblem { key, why: error.kind.to_string() })
-    }
-
     /// Returns the path of the file.
     pub(crate) fn file(&self) -> &Path {
         &self.source.file
+    }
+
+    /// Returns the name of a link; empty for none.
+    pub(super) fn link_name(&self, link: usize) -> String {
+        self.links.get(link).map_or_else(String::new, |link| link.name.clone())
     }
 
     /// Returns the index of the link with a name; an error if there is none.

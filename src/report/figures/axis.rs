@@ -1,6 +1,7 @@
 //! Axes with round tick values.
 
 use super::svg::{Colour, MUTED};
+use crate::numeric::whole;
 use crate::quantity::format::{number, power_of_ten};
 
 /// Fraction of the values, the smallest in absolute value, that an axis always includes (the inner
@@ -45,7 +46,7 @@ impl Axis {
         // `count` numbers divide the axis into `count` + 1 parts.
         let parts = (count + 1) as f64;
         let step = if count > 0 { round_step((high - low) / parts) } else { f64::INFINITY };
-        let digits = clamped_integer((-step.log10()).ceil());
+        let digits = decimal_count((-step.log10()).ceil());
         let first = (low / step - 1e-9).ceil();
         let values = (0..=64).map(|k| (first + f64::from(k)) * step);
         let ticks = values.take_while(|value| *value <= high + 1e-9 * (high - low));
@@ -102,7 +103,7 @@ fn linear_number(value: f64, digits: usize, (exponent, step): (f64, f64)) -> Str
     if exponent <= MAX_PLAIN_EXPONENT || value == 0.0 {
         return number(value, digits);
     }
-    let mantissa_digits = clamped_integer((exponent - step.log10()).ceil());
+    let mantissa_digits = decimal_count((exponent - step.log10()).ceil());
     let mantissa = number(value / 10.0_f64.powf(exponent), mantissa_digits);
     format!("{mantissa}·{}", power_of_ten(exponent))
 }
@@ -110,22 +111,16 @@ fn linear_number(value: f64, digits: usize, (exponent, step): (f64, f64)) -> Str
 /// Returns 10^`exponent` × `step` as text: `0.05`, `30`, or `10⁻⁶`.
 fn power(exponent: f64, step: f64) -> String {
     if (-4.0..5.0).contains(&exponent) {
-        let digits = clamped_integer(-exponent) + usize::from(step.fract() > 0.0 && exponent < 1.0);
+        let digits = decimal_count(-exponent) + usize::from(step.fract() > 0.0 && exponent < 1.0);
         return number(step * 10.0_f64.powf(exponent), digits);
     }
     let power = power_of_ten(exponent);
     if step > 1.0 { format!("{step}·{power}") } else { power }
 }
 
-/// Returns the integer part of a number, limited to 0…12.
-fn clamped_integer(value: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to 0..=12"
-    )]
-    let whole = value.clamp(0.0, 12.0) as usize;
-    whole
+/// Returns a number of decimals: the integer part of the value, limited to 0…12.
+fn decimal_count(value: f64) -> usize {
+    whole(value.clamp(0.0, 12.0))
 }
 
 /// Returns the smallest of 1, 2, 5 or 10 times a power of ten that is at least `value`.
@@ -157,12 +152,7 @@ pub fn axis_limit(values: impl IntoIterator<Item = f64>) -> f64 {
         values.into_iter().map(f64::abs).filter(|size| size.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
     let Some(&largest) = sizes.last() else { return 0.0 };
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a fraction of a length"
-    )]
-    let inner = sizes[((sizes.len() - 1) as f64 * INNER_FRACTION) as usize];
+    let inner = sizes[whole((sizes.len() - 1) as f64 * INNER_FRACTION)];
     if inner > 0.0 && largest > OUTLIER_RATIO * inner { INNER_MARGIN * inner } else { largest }
 }
 

@@ -142,11 +142,6 @@ impl Panel {
         }
     }
 
-    /// Returns the height of the panel with the space above and below in displayed pixels.
-    fn total_height(&self) -> f64 {
-        SPACE_ABOVE + self.height + self.below()
-    }
-
     /// Draws the panel at the distance `top` \[displayed pixels\] from the top of the figure.
     fn draw(&self, svg: &mut Svg, top: f64) {
         let (left, right) = (self.sides.0, FIGURE_WIDTH - self.sides.1);
@@ -253,7 +248,7 @@ pub fn chart(label: &str, legend: &[Entry], panels: &[Panel]) -> String {
     }
     for panel in panels {
         panel.draw(&mut svg, top);
-        top += panel.total_height();
+        top += SPACE_ABOVE + panel.height + panel.below();
     }
     svg.finish((FIGURE_WIDTH, top), label)
 }

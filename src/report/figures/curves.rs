@@ -80,9 +80,10 @@ impl Series<'_> {
         let x = if self.is_logarithmic {
             Axis::logarithmic(across, self.labels.0, 8)
         } else {
+            // An axis of counts has no ticks between whole numbers.
             let is_count = points().all(|at| at.0.fract() == 0.0);
-            let labels = if is_count { labels_of_counts(across, 7) } else { 7 };
-            Axis::linear(across, self.labels.0, labels)
+            let fits = |labels: &usize| !is_count || *labels as f64 <= across.1 - across.0;
+            Axis::linear(across, self.labels.0, (1..=7).rev().find(fits).unwrap_or(1))
         };
         let named = |text: &String, at: At, shift: (f64, f64), anchor: Anchor| Shape::Text {
             at,
@@ -139,12 +140,6 @@ impl Series<'_> {
         let svg = chart(self.names.1, &legend, &[panel]);
         Some(Drawing::new(self.names, caption, svg, data))
     }
-}
-
-/// Returns the number of tick labels, `most` or fewer, at which an axis of counts has no ticks
-/// between whole numbers.
-fn labels_of_counts((low, high): (f64, f64), most: usize) -> usize {
-    (1..=most).rev().find(|&labels| labels as f64 <= high - low).unwrap_or(1)
 }
 
 impl Curve<'_> {

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::prelude::*;
 use crate::fit::{ErrorsBefore, Procedure};
-use crate::report::arm_names::{DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
+use crate::report::errors::{DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
 use crate::results::{Stage, StageErrors, procedure_stages};
 
 /// Maximum number of poses that the figure shows.

@@ -1,7 +1,7 @@
 //! Figure of the distribution of the residuals.
 
 use super::prelude::*;
-use crate::numeric::median;
+use crate::numeric::{median, whole};
 
 /// Smallest half-width of the axis \[σ\]. The half-width is four times the scatter of the residuals
 /// if that is more. Values outside the axis are counted in the outermost bars.
@@ -30,14 +30,7 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let width = 2.0 * reach / bars as f64;
     let mut counts = vec![0_usize; bars];
     for value in &values {
-        let shifted = ((value + reach) / width).floor().clamp(0.0, (bars - 1) as f64);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped to the bars"
-        )]
-        let bar = shifted as usize;
-        counts[bar] += 1;
+        counts[whole((value + reach) / width).min(bars - 1)] += 1;
     }
     let scale = values.len() as f64 * width;
     let normal = |u: f64| scale * (-0.5 * u * u).exp() / (2.0 * std::f64::consts::PI).sqrt();

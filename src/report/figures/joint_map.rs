@@ -1,6 +1,7 @@
 //! Figure of the residual by ranges of each joint's command.
 
 use super::prelude::*;
+use crate::numeric::whole;
 use crate::results::CommandedJoint;
 
 /// Number of equal ranges into which the commands of a joint are divided.
@@ -28,13 +29,7 @@ fn joint_ranges(data: &PlotData, joint: usize) -> Vec<JointRange> {
     let width = (high - low) / COMMAND_RANGES as f64;
     let mut sums = [(0.0, 0_usize); COMMAND_RANGES];
     for pose in poses() {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped to the ranges"
-        )]
-        let index = ((pose.configuration[joint] - low) / width)
-            .clamp(0.0, COMMAND_RANGES as f64 - 1.0) as usize;
+        let index = whole((pose.configuration[joint] - low) / width).min(COMMAND_RANGES - 1);
         sums[index].0 += pose.error.norm_squared();
         sums[index].1 += 1;
     }

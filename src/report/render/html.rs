@@ -8,7 +8,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::markdown::markdown;
 use super::poses;
 use super::style;
-use super::text::with_outcome;
+use super::text::{text, with_outcome};
 use crate::error::is_hidden;
 use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
@@ -55,9 +55,34 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
     Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
 }
 
-/// Renders blocks as a page without separate files; `kind` names the analysis in its title.
-pub(in crate::report) fn page(title: &str, kind: &str, blocks: &[Block]) -> String {
-    render_page(title, ["", kind], "", blocks).0
+/// Result of a command in words, for its screen and for a page without separate files.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Story {
+    title: String,
+    /// Name of the analysis in the title of the page.
+    kind: &'static str,
+    blocks: Vec<Block<'static>>,
+}
+
+impl Story {
+    pub(in crate::report) fn new(
+        title: &str,
+        kind: &'static str,
+        blocks: Vec<Block<'static>>,
+    ) -> Self {
+        Self { title: title.to_owned(), kind, blocks }
+    }
+
+    /// Returns the text for terminals, ending in a line break.
+    pub fn text(&self) -> String {
+        text(&self.blocks)
+    }
+
+    /// Returns the page.
+    pub fn page(&self) -> String {
+        render_page(&self.title, ["", self.kind], "", &self.blocks).0
+    }
 }
 
 /// Renders blocks as a page, and returns it with its figures. `before_kind` precedes the kind in
@@ -249,7 +274,7 @@ fn table(table: &Table) -> Markup {
         }
         // Rows that continue the row above cannot be sorted.
         @let sorts = table.rows.len() > 3 && table.rows.iter().all(|row| row.first().is_some_and(|cell| !cell.is_empty()));
-        div.scroll tabindex="0" role="region" aria-label={ (TABLE_LABEL) (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts].many[table.header.len() > MAX_ONE_LINE_COLUMNS] {
+        div.scroll tabindex="0" role="region" aria-label={ (TABLE_LABEL) (table.header.iter().find(|head| !head.is_empty()).map_or("", String::as_str)) } { table.sort[sorts].many[table.header.len() > MAX_ONE_LINE_COLUMNS] {
             thead { tr {
                 // An empty cell is no header.
                 @for (k, text) in table.header.iter().enumerate() {

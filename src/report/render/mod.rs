@@ -6,7 +6,7 @@ mod poses;
 mod style;
 mod text;
 
-pub use html::Report;
-pub(super) use html::{page, report};
+pub(super) use html::report;
+pub use html::{Report, Story};
 pub(super) use text::text;
 pub use text::{limit_text_width, text_width};

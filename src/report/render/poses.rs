@@ -9,15 +9,6 @@ use crate::results::{PlotData, ScriptData};
 /// Maximum number of rows in the table of the largest residuals.
 const MAX_LISTED_ROWS: usize = 12;
 
-/// Returns the data of the page's script as JSON, escaped so that it cannot end the HTML element
-/// that contains it.
-fn script_data(data: &PlotData) -> String {
-    serde_json::to_string(&ScriptData::of(data))
-        .unwrap_or_default()
-        .replace('<', "\\u003c")
-        .replace("//", "/\\/")
-}
-
 /// Renders the section on individual poses; a sentence alone if no row can be drawn.
 pub(super) fn section(data: &PlotData) -> Markup {
     let without = without_positions(data);
@@ -37,7 +28,9 @@ pub(super) fn section(data: &PlotData) -> Markup {
             " " button type="button" data-do="none" { "none" }
         }
         (largest(data))
-        script type="application/json" id="poses" { (PreEscaped(script_data(data))) }
+        // Escapes keep the data from ending the element that contains them.
+        @let json = serde_json::to_string(&ScriptData::of(data)).unwrap_or_default();
+        script type="application/json" id="poses" { (PreEscaped(json.replace('<', "\\u003c").replace("//", "/\\/"))) }
     }
 }
 

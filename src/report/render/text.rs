@@ -149,8 +149,7 @@ fn plain(words: &str) -> String {
 /// Renders a table without ruled lines. Cells of a table wider than `width` are wrapped at spaces.
 /// If the table is still too wide, minor columns are omitted, and a last line names them.
 fn table(table: &Table, width: usize) -> String {
-    let header = table.header.iter().map(|&name| name.to_owned()).collect();
-    let mut lines: Vec<Vec<String>> = vec![header];
+    let mut lines = vec![table.header.clone()];
     lines.extend(table.rows.iter().map(|row| row.iter().map(|cell| plain(cell)).collect()));
     let (widths, omitted) = column_widths(&lines, &table.minor, width);
     let mut shown = comfy_table::Table::new();
@@ -167,12 +166,9 @@ fn table(table: &Table, width: usize) -> String {
         column.set_constraint(if is_omitted { ColumnConstraint::Hidden } else { constraint });
     }
     let mut text: String = shown.lines().map(|line| line.trim_end().to_owned() + "\n").collect();
-    let names: Vec<&str> = table
-        .header
-        .iter()
-        .enumerate()
-        .filter_map(|(k, name)| omitted.contains(&k).then_some(*name))
-        .collect();
+    let is_omitted = |(k, _): &(usize, &String)| omitted.contains(k);
+    let names = table.header.iter().enumerate().filter(is_omitted).map(|(_, name)| name.as_str());
+    let names: Vec<&str> = names.collect();
     if !names.is_empty() {
         let note = format!("omitted on this narrow terminal: {}", names.join("; "));
         text.push_str(&wrapped(&note, ("  ", "  "), width));

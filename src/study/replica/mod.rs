@@ -9,13 +9,11 @@
 
 mod alternative;
 mod fit;
-mod measured_pose;
 mod read;
 mod reading;
 mod results;
 mod run;
 mod simulated_arm;
-mod size;
 mod study;
 
 pub use alternative::AlternativeModel;

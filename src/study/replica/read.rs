@@ -8,7 +8,7 @@ use crate::problem::read::name;
 use crate::problem::section::Section;
 use crate::quantity::Unit;
 use crate::rig::{HeldOutRows, Truth};
-use crate::study::input::{count, distinct, problem_of};
+use crate::study::input::{above_zero, count, distinct, length, problem_of};
 
 impl MisprintStudy {
     /// Reads the sections of a document; `file` is the path of the document.
@@ -33,34 +33,16 @@ impl MisprintStudy {
         let identification =
             count(&root.require("identification_poses", "identification_poses = 28")?)?;
         let held_out = count(&root.require("held_out_poses", "held_out_poses = 50")?)?;
-        let sigma = root.positive("position_sigma", Unit::Length, |value| {
-            InputErrorKind::NotPositive { value }
-        })?;
-        let sigma =
-            sigma.ok_or_else(|| root.missing("position_sigma_mm", "position_sigma_mm = 0.05"))?;
-        let leaves = root.positive("rigid_leaves", Unit::Length, |value| {
-            InputErrorKind::NotPositive { value }
-        })?;
-        let rigid_leaves =
-            leaves.ok_or_else(|| root.missing("rigid_leaves_mm", "rigid_leaves_mm = 3.9673"))?;
+        let sigma = length(&mut root, "position_sigma", "position_sigma_mm = 0.05")?;
+        let rigid_leaves = length(&mut root, "rigid_leaves", "rigid_leaves_mm = 3.9673")?;
         let shares = root.require("links_over_joints", "links_over_joints = [1.0]")?;
-        let mut links_over_joints = distinct(&shares, |item| {
-            let value = item.number()?;
-            if value > 0.0 {
-                Ok(value)
-            } else {
-                Err(item.error(InputErrorKind::NotPositive { value }))
-            }
-        })?;
+        let mut links_over_joints = distinct(&shares, above_zero)?;
         // The case with the ratio closest to the declared one comes first.
         links_over_joints.sort_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
         let one_load = root.section("one_load")?.map(load).transpose()?;
-        let second_load = match root.section("second_load")? {
-            Some(section) => load(section)?,
-            None => {
-                return Err(root.missing("second_load", "[second_load] with payload_kg or hoist_N"));
-            }
-        };
+        let second_load = root.section("second_load")?;
+        let missing = || root.missing("second_load", "[second_load] with payload_kg or hoist_N");
+        let second_load = load(second_load.ok_or_else(missing)?)?;
         let shares = links_over_joints
             .iter()
             .map(|&links_over_joints| Case { links_over_joints, load: None });

@@ -3,8 +3,7 @@
 use nalgebra::Vector3;
 
 use super::alternative::stiffen;
-use super::fit::{ReplicaError, identify_as_published, position_errors};
-use super::measured_pose::MeasuredPose;
+use super::fit::{MeasuredPose, ReplicaError, identify_as_published, position_errors};
 use super::study::{Case, MisprintStudy};
 use crate::paper::{Form, Options, StiffnessStage};
 use crate::problem::{PoseConditions, Problem};

@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::axis::is_prismatic;
-use super::figure::{Cause, Point};
+use super::figure::{Cause, Point, is_prismatic};
 use super::terms::EffectRows;
 use super::view::{at_joint, beyond_joints, change_along};
 use crate::model::parameter::{EffectParameter, JointField, ParameterSite, value_regressor};

@@ -5,14 +5,13 @@
 //! an effect on a joint it is converted to the error of the joint coordinate by the lever of each
 //! pose. For other effects it is the component along the displacement by the effect.
 
-mod axis;
 mod effect;
 mod figure;
 mod terms;
 mod unexplained;
 mod view;
 
-pub use axis::Quantity;
 pub(super) use effect::{EffectFit, coordinates, of};
+pub use figure::Quantity;
 pub use figure::{Cause, Point};
 pub(super) use unexplained::unexplained;

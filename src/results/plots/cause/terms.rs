@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::axis::Quantity;
+use super::figure::Quantity;
 use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{PoseView, Problem};
@@ -27,12 +27,6 @@ impl EffectRows<'_> {
     pub fn site(&self) -> Option<ParameterSite> {
         let (first, others) = self.sites.split_first()?;
         others.iter().all(|site| site == first).then_some(*first)
-    }
-
-    /// Returns true if no term has a constant regressor, so that the effect varies from pose to
-    /// pose.
-    pub fn is_driven(&self) -> bool {
-        self.terms.iter().all(|(regressor, _)| !regressor.is_constant())
     }
 
     /// Returns the quantities on which the terms depend, without duplicates.

@@ -1,7 +1,6 @@
 //! Figure data of structure without a known cause.
 
-use super::axis::Quantity;
-use super::figure::{Cause, Point};
+use super::figure::{Cause, Point, Quantity};
 use super::view::COORDINATE_CAPTION;
 use crate::measurement::Split;
 use crate::numeric::range;

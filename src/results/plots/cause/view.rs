@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::axis::{Quantity, is_prismatic};
+use super::figure::{Quantity, is_prismatic};
 use super::terms::{EffectRows, Law};
 use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
@@ -61,7 +61,9 @@ pub fn at_joint<'a>(
         (across, levers.iter().zip(&rows.displacements).map(moment).collect())
     };
     let (across, x, law): (_, _, Law) = match field {
-        JointField::Theta | JointField::D if rows.is_driven() => {
+        JointField::Theta | JointField::D
+            if rows.terms.iter().all(|(regressor, _)| !regressor.is_constant()) =>
+        {
             match (rows.quantities().as_slice(), rows.terms.as_slice()) {
                 (&[quantity], _) if rows.over_quantity(quantity, problem).is_some() => {
                     rows.over_quantity(quantity, problem)?
