@@ -45,11 +45,11 @@ pub(super) struct Data<'a> {
 }
 
 /// Cached laws by key.
-pub(super) type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
+type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
 
 /// Key of cached laws: names of the sites, names of the other hypotheses assumed, poses left out,
 /// and names of the fitted effects.
-pub(super) type ProposalKey = (String, Vec<String>, Vec<usize>, Vec<String>);
+type ProposalKey = (String, Vec<String>, Vec<usize>, Vec<String>);
 
 /// Number of points in images that count as one pose in the limit of the rows of evidence. A point
 /// has less information than a position, and a view has many.

@@ -1,8 +1,7 @@
 //! Probabilities of all sets of hypotheses, and the claims that follow.
 
 use super::families::OtherHypotheses;
-use super::hypothesis::{Hypothesis, HypothesisKind, Site};
-use super::hypothesis_set::HypothesisSet;
+use super::hypothesis::{Hypothesis, HypothesisKind, HypothesisSet, Site};
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 

@@ -23,7 +23,7 @@ use crate::residual_tests::Covariate;
 const MIN_NEW_SIZE: f64 = 1e-3;
 
 /// Returns true if gravity acts on an arm without declared masses.
-pub(super) fn is_weight_unknown(problem: &Problem) -> bool {
+fn is_weight_unknown(problem: &Problem) -> bool {
     let has_mass =
         problem.joints.iter().any(|joint| !joint.bodies.is_empty() || joint.beam.is_some());
     problem.gravity.norm() > 0.0 && !has_mass
