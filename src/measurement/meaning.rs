@@ -171,7 +171,7 @@ pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
 }
 
 /// Conversion of a column `time` without a unit. Its cells must be dates, so numbers become NaN.
-pub(super) const DATE_CONVERSION: fn(f64) -> f64 = |_| f64::NAN;
+const DATE_CONVERSION: fn(f64) -> f64 = |_| f64::NAN;
 
 /// Returns the meaning of a column named after a joint, such as `shoulder_pan_joint_rad`. `None`
 /// for other columns, and for a joint name that several joints or another column have.

@@ -9,10 +9,7 @@ mod appended;
 #[deny(clippy::indexing_slicing)]
 mod beginning;
 mod builder;
-#[deny(clippy::indexing_slicing)]
-mod cell_style;
 mod cell_words;
-mod cells;
 mod clocks;
 #[deny(clippy::indexing_slicing)]
 mod column_table;
@@ -38,8 +35,6 @@ mod latin;
 mod limits;
 #[deny(clippy::indexing_slicing)]
 mod lines;
-#[deny(clippy::indexing_slicing)]
-mod lost;
 #[deny(clippy::indexing_slicing)]
 mod mapped;
 #[deny(clippy::indexing_slicing)]
