@@ -3,9 +3,8 @@
 use super::argument::Argument;
 use super::expression::{Expression, FormulaError, Names, Parsed, Vocabulary, parse};
 use super::family::{At, Prior, RANGE_AXIS};
-use super::parameter::LawParameter;
 use super::site::{BeamField, MOTION_NAMES};
-use super::term::EffectTerm;
+use super::term::{EffectTerm, LawParameter};
 
 /// Name of declared laws in files.
 pub(crate) const LAW: &str = "law";
