@@ -81,7 +81,7 @@ impl Measurements {
         }
         let is_moving = |joint: &usize| {
             let declared = problem.joints.get(*joint);
-            declared.is_some_and(|joint| joint.command_kind() != JointKind::Fixed)
+            declared.is_some_and(|joint| joint.takes_command())
         };
         let mut moving: Vec<usize> = (0..self.joints).filter(is_moving).collect();
         moving.pop();

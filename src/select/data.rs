@@ -14,7 +14,7 @@ use crate::fit::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::{DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
 use crate::observation::Needs;
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
 use crate::residual_tests::CovariateValues;
 
@@ -207,11 +207,7 @@ impl<'a> Data<'a> {
     /// identification row.
     pub fn covariates(&self, problem: &Problem) -> Vec<CovariateValues> {
         let measurements = self.measurements;
-        let moving = problem
-            .joints
-            .iter()
-            .enumerate()
-            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
+        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.takes_command());
         let joint = |(index, _): (usize, _)| CovariateValues {
             covariate: Covariate::Command(index),
             values: self.rows().iter().map(|&row| measurements.configuration(row)[index]).collect(),

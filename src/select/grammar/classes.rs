@@ -11,7 +11,7 @@ use super::site::{Noise, Weighted, WhitenedSite};
 use super::terms::{Sum, Terms, is_separated};
 use super::written::{Written, write_law};
 use crate::laws::{At, Law};
-use crate::problem::{Effect, Joint, JointKind, Problem};
+use crate::problem::{Effect, Joint, Problem};
 
 /// Largest ln odds of the best sum over another sum that is kept.
 const MAX_LN_ODDS: f64 = 12.0;
@@ -274,7 +274,7 @@ pub fn ln_prior(effect: &Effect, problem: &Problem) -> Option<f64> {
 /// Returns ln of the prior weight of all laws at the site of a law, relative to a family of
 /// effects.
 fn ln_weight(law: &Law, problem: &Problem) -> f64 {
-    let takes_command = |joint: &&Joint| joint.command_kind() != JointKind::Fixed;
+    let takes_command = |joint: &&Joint| joint.takes_command();
     let joints = problem.joints.iter().filter(takes_command).count().max(1) as f64;
     match law.at() {
         At::Coordinate => (PRIOR_OF_GRAMMAR / joints).ln(),
