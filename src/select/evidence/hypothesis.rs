@@ -129,6 +129,16 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
+    /// Creates a hypothesis from its kind, site, coordinate and quantities.
+    pub fn new(
+        kind: HypothesisKind,
+        site: Site,
+        coordinate: Option<ParameterSite>,
+        depends_on: Vec<Covariate>,
+    ) -> Self {
+        Self { kind, site, coordinate, depends_on }
+    }
+
     /// Creates the hypothesis of an effect; its terms determine the site and the quantities.
     /// `coverage` states whether directions of approach and times are recorded.
     pub fn of_effect(effect: &Effect, problem: &Problem, coverage: (bool, bool)) -> Self {

@@ -47,12 +47,8 @@ pub(super) fn limits(
             columns.rows(0, 3 * evidence_poses).norm() / ((3 * evidence_poses) as f64).sqrt();
         let coefficients =
             Coefficients { largest: vec![largest * length], ..Coefficients::default() };
-        let hypothesis = Hypothesis {
-            kind: HypothesisKind::Limit(words),
-            site: Site::of(site),
-            coordinate: None,
-            depends_on: Vec::new(),
-        };
+        let hypothesis =
+            Hypothesis::new(HypothesisKind::Limit(words), Site::of(site), None, Vec::new());
         let design = Design::Dense(columns).scaled(evidence_poses)?;
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     };
