@@ -39,8 +39,8 @@ impl Measurements {
         let (row, least) = temperatures().enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let is_usual = temperatures().all(|value| ROOM_FAHRENHEIT.contains(&value));
         let kind = WarningKind::Fahrenheit { least: format!("{least}") };
-        let location = self.location(row).with_key("temperature_C");
-        (is_usual && reference <= MAX_ROOM_TEMPERATURE).then_some(Warning { location, kind })
+        (is_usual && reference <= MAX_ROOM_TEMPERATURE)
+            .then(|| self.warning(row, "temperature_C", kind))
     }
 
     /// Returns a warning, located at the first row, if the hoist forces are about the declared
@@ -57,8 +57,7 @@ impl Measurements {
             usual: format!("{usual}"),
             declared: format!("{declared}"),
         };
-        let location = self.location(0).with_key("hoist_N");
-        ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then_some(Warning { location, kind })
+        ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then(|| self.warning(0, "hoist_N", kind))
     }
 
     /// Returns a warning, located at the first payload, if the payloads are round numbers of
@@ -81,8 +80,7 @@ impl Measurements {
             newtons: format!("{newtons}"),
             kilograms: format!("{:.1}", newtons / GRAVITY),
         };
-        let location = self.location(row).with_key("payload_kg");
-        (different.len() > 1 && looks_like_weights).then_some(Warning { location, kind })
+        (different.len() > 1 && looks_like_weights).then(|| self.warning(row, "payload_kg", kind))
     }
 
     /// Returns a warning if the reference temperature is far beyond all temperatures.
@@ -142,8 +140,8 @@ impl Measurements {
             longest: format!("{:.3}", length(longest) * 1e3),
             links: format!("{links:.3}"),
         };
-        let location = self.location(longest).with_key("distance_mm");
-        (length(longest) < MIN_PLAUSIBLE_DISTANCE * links).then_some(Warning { location, kind })
+        (length(longest) < MIN_PLAUSIBLE_DISTANCE * links)
+            .then(|| self.warning(longest, "distance_mm", kind))
     }
 
     /// Returns a warning, located at the largest angle, if columns in degrees are probably in
@@ -173,7 +171,7 @@ impl Measurements {
             rows.any(|value| value > 0.0)
         });
         let kind = WarningKind::FewDegrees { widest: format!("{widest:.1}") };
-        let location = self.location(row).with_key(format!("joint {}", joint + 1));
-        (widest <= TAU && least.count() > 1).then_some(Warning { location, kind })
+        (widest <= TAU && least.count() > 1)
+            .then(|| self.warning(row, format!("joint {}", joint + 1), kind))
     }
 }

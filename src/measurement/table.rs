@@ -436,6 +436,14 @@ impl Table {
         self.location(Some(place)).with_key(format!("column {}", shortened(name))).error(kind)
     }
 
+    /// Creates an error about a cell of the current row, or about the whole row without a cell.
+    pub fn error_in(&self, place: Option<usize>, kind: impl Into<InputErrorKind>) -> InputError {
+        match place {
+            Some(place) => self.cell_error(place, kind),
+            None => self.error(kind),
+        }
+    }
+
     /// Returns the location of a column in the header line, for errors.
     pub fn column(&self, name: &str) -> Location {
         let place = self.header.iter().position(|header| header == name);

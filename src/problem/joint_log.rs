@@ -18,11 +18,12 @@ pub struct JointLog {
 }
 
 /// Rule that pairs the rows of two tables.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum JoinRule {
     /// Pairs rows with the same word in the column `pose`.
     Name,
     /// Pairs the k-th row of one table with the k-th row of the other.
+    #[default]
     Order,
     /// Pairs each row with the one nearest in time, at most `tolerance` apart \[s\].
     Time {
