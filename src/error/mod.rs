@@ -105,6 +105,11 @@ impl Location {
         self
     }
 
+    /// Returns the location of a key of the same section, without excerpt.
+    pub(crate) fn of_key(&self, key: impl Into<String>) -> Self {
+        Self { excerpt: None, ..self.clone() }.with_key(key)
+    }
+
     /// Returns an error at this location.
     pub(crate) fn error(self, kind: impl Into<InputErrorKind>) -> InputError {
         InputError { location: Box::new(self), kind: Box::new(kind.into()) }

@@ -201,19 +201,14 @@ impl Law {
             parameters.iter().map(|parameter| parameter.name.clone()).collect();
         let vocabulary = Vocabulary { parameters: &words, ..*vocabulary };
         let read = |(k, term): (usize, &_)| {
-            let term: &str = AsRef::as_ref(term);
-            parse(term, &vocabulary).map_err(|error| (k, error))
+            parse(AsRef::as_ref(term), &vocabulary).map_err(|error| (k, error))
         };
         Ok(Self {
             name: name.to_owned(),
             place: site.place,
             at: site.at,
             prior,
-            terms: terms
-                .iter()
-                .enumerate()
-                .map(|(k, term)| read((k, term)))
-                .collect::<Result<_, _>>()?,
+            terms: terms.iter().enumerate().map(read).collect::<Result<_, _>>()?,
             parameters,
             covariates: vocabulary.covariates.to_vec(),
             composition: None,
