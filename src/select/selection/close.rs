@@ -107,9 +107,9 @@ pub fn close_by(
 ) -> Result<ClosedLoop, IdentifyError> {
     rules.check()?;
     // A stop request ends only the search; the effects found so far are still fitted and tested.
-    let data = Data::new(problem, data, rules).with_candidates(&options.candidates);
+    let data = Data { candidates: &options.candidates, ..Data::new(problem, data, rules) };
     let (stoppable, unstoppable) = (
-        data.clone().with_stop(options.stop.clone().unwrap_or_default()),
+        Data { stop: options.stop.clone().unwrap_or_default(), ..data.clone() },
         options.clone().with_stop(None),
     );
     // Evidence is evaluated for positions only, so only positions are fitted.
@@ -347,7 +347,7 @@ fn fit_with_found(
     let sure: Vec<Effect> = sure.map(|found| found.effect.clone()).collect();
     let problem = state.problem(fitted, &sure);
     // Only the errors of this fit are reported, so a fit of many unknowns is not checked.
-    let options = if state.affordable_fits(fitted) > 1 {
+    let options = if state.affordable_fits(fitted.unknowns.len()) > 1 {
         fitted.options_from_estimates(options)
     } else {
         Options { provisional: true, ..fitted.warm_started_options(options, true) }

@@ -156,7 +156,7 @@ fn fit_rivals(
     };
     let functions = best.without_law();
     let mut rivals = evidence.rival_sets(&best, MAX_RIVALS);
-    rivals.truncate(state.affordable_fits(fitted) - 1);
+    rivals.truncate(state.affordable_fits(fitted.unknowns.len()) - 1);
     let mut tried: Vec<(HypothesisSet, f64, Fitted)> = Vec::new();
     // The map holds ln posterior of the present set for each set of outliers.
     let mut ln_posterior_by_outliers: BTreeMap<BTreeSet<usize>, Option<f64>> = BTreeMap::new();
