@@ -39,8 +39,7 @@ impl PoseRanges {
     /// # Errors
     /// Returns an error if a moving joint lacks a limit.
     pub fn of(problem: &Problem) -> Result<Self, DesignError> {
-        for joint in problem.joints.iter().filter(|joint| joint.command_kind() != JointKind::Fixed)
-        {
+        for joint in problem.joints.iter().filter(|joint| joint.takes_command()) {
             for (end, limit) in [("min", joint.limits.0), ("max", joint.limits.1)] {
                 if !limit.is_finite() {
                     return Err(DesignError::no_range(joint, end));

@@ -24,7 +24,6 @@ mod sensitivity;
 mod separate;
 mod site;
 mod tolerance;
-mod travel;
 mod views;
 mod workspace;
 mod workspace_error;

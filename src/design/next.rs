@@ -7,11 +7,11 @@ use super::explanations::{Explanations, ExplanationsError};
 use super::greedy::Greedy;
 use super::misfit::Misfit;
 use super::pool::{Pool, pool_and_workspace};
-use super::travel::Travel;
 use super::workspace_error::{MisfitSize, WorkspaceError};
 use super::{Candidates, Criterion, DesignError, Exchange, Sensitivity, Site, Workspace, views};
 use crate::fit::{self, FindingCode, Identification, IdentifyError, Options};
 use crate::measurement::{Dataset, Measurements};
+use crate::numeric::range;
 use crate::problem::{Effect, Problem};
 use crate::remainder::{self, Correction, SavedRemainderError};
 
@@ -439,4 +439,28 @@ fn check_size(
         return Err(NextError::TooLarge { poses, candidates, unknowns });
     }
     Ok(())
+}
+
+/// Measure of the travel between configurations, relative to the joints' ranges over some poses.
+#[derive(Debug, Clone)]
+struct Travel {
+    /// Inverse width of each joint's range [1/rad] or [1/m]; 0 for a joint that does not move.
+    scales: Vec<f64>,
+}
+
+impl Travel {
+    /// Takes the ranges of the joints from the poses of a table.
+    pub fn of(table: &Measurements) -> Self {
+        let scale = |joint: usize| {
+            let (low, high) = range((0..table.len()).map(|row| table.configuration(row)[joint]));
+            if high > low { (high - low).recip() } else { 0.0 }
+        };
+        Self { scales: (0..table.joints).map(scale).collect() }
+    }
+
+    /// Returns the largest move of a joint between two configurations, as a fraction of its range.
+    pub fn between(&self, from: &[f64], to: &[f64]) -> f64 {
+        let moves = from.iter().zip(to).zip(&self.scales);
+        moves.map(|((from, to), scale)| (to - from).abs() * scale).fold(0.0, f64::max)
+    }
 }

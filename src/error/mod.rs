@@ -44,7 +44,7 @@ pub(crate) const BYTE_ORDER_MARK_UTF8: &[u8] = b"\xef\xbb\xbf";
 pub(crate) const BYTE_ORDER_MARKS: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
 
 /// Place in an input file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Location {
     /// Path of the file.
     pub file: PathBuf,
@@ -102,6 +102,11 @@ impl Location {
     pub(crate) fn with_key(mut self, key: impl Into<String>) -> Self {
         self.key = Some(key.into());
         self
+    }
+
+    /// Returns the location of a key of the same section, without excerpt.
+    pub(crate) fn of_key(&self, key: impl Into<String>) -> Self {
+        Self { excerpt: None, ..self.clone() }.with_key(key)
     }
 
     /// Returns an error at this location.

@@ -32,11 +32,13 @@ impl Effect {
     /// number, a link, a time, the name of a law. Empty if it acts on the whole arm or measurement.
     #[doc(hidden)]
     pub fn place(&self) -> String {
-        if let Self::Law(law) = self {
-            return law.name().to_owned();
-        }
-        let places = self.arguments().into_iter().filter_map(|(_, argument)| argument.place());
-        places.collect::<Vec<_>>().join(",")
+        if let Self::Law(law) = self { law.name().to_owned() } else { self.place_without(None) }
+    }
+
+    /// Returns the places of all arguments but the one with the key `left_out`.
+    fn place_without(&self, left_out: Option<&str>) -> String {
+        let arguments = self.arguments().into_iter().filter(|(key, _)| Some(*key) != left_out);
+        arguments.filter_map(|(_, argument)| argument.place()).collect::<Vec<_>>().join(",")
     }
 
     /// Returns the declaration in the syntax of a problem file: `gear-ratio = { joint = 3 }`.
@@ -68,10 +70,10 @@ impl Effect {
     pub(crate) fn link(&self) -> Option<String> {
         match self {
             Self::Law(law) => law.link().map(str::to_owned),
-            _ => self.argument("link").and_then(|argument| match argument {
+            _ => match self.argument("link")? {
                 Argument::Name(link) => Some(link),
                 _ => None,
-            }),
+            },
         }
     }
 
@@ -96,10 +98,10 @@ impl Effect {
     /// Returns the parameters with their formulas, parsed with the words of `vocabulary`.
     /// Parameters whose formula uses another word are left out.
     pub(crate) fn entries(&self, vocabulary: &Vocabulary) -> Vec<EffectTerm> {
-        let family = match self {
-            Self::Law(law) => return law.entries(),
-            _ => self.family().unwrap_or(&Family::PLAIN),
-        };
+        if let Self::Law(law) = self {
+            return law.entries();
+        }
+        let family = self.family().unwrap_or(&Family::PLAIN);
         let arguments = self.arguments();
         let is_at_mount = |entry: &&TermEntry| match entry.at {
             At::Coordinate => self.joint().is_some(),
@@ -292,13 +294,7 @@ impl Effect {
         if let Self::Law(law) = self {
             return format!("law {}", law.name());
         }
-        let searched = self.searched();
-        let fixed_arguments =
-            self.arguments().into_iter().filter(|(key, _)| Some(*key) != searched);
-        let place = fixed_arguments
-            .filter_map(|(_, argument)| argument.place())
-            .collect::<Vec<_>>()
-            .join(",");
+        let place = self.place_without(self.searched());
         if place.is_empty() { self.name().to_owned() } else { format!("{} {place}", self.name()) }
     }
 
@@ -381,12 +377,8 @@ impl Effect {
     fn with(&self, key: &str, value: &Argument) -> Option<Self> {
         let arguments = self.arguments();
         Self::from_name(self.name(), &|wanted| {
-            let present = || arguments.iter().find(|(known, _)| *known == wanted);
-            if wanted == key {
-                Some(value.clone())
-            } else {
-                present().map(|(_, value)| value.clone())
-            }
+            let present = arguments.iter().find(|(known, _)| *known == wanted);
+            if wanted == key { Some(value) } else { present.map(|(_, value)| value) }.cloned()
         })
     }
 

@@ -3,9 +3,8 @@
 use super::argument::Argument;
 use super::expression::{Expression, FormulaError, Names, Parsed, Vocabulary, parse};
 use super::family::{At, Prior, RANGE_AXIS};
-use super::parameter::LawParameter;
 use super::site::{BeamField, MOTION_NAMES};
-use super::term::EffectTerm;
+use super::term::{EffectTerm, LawParameter};
 
 /// Name of declared laws in files.
 pub(crate) const LAW: &str = "law";
@@ -202,19 +201,14 @@ impl Law {
             parameters.iter().map(|parameter| parameter.name.clone()).collect();
         let vocabulary = Vocabulary { parameters: &words, ..*vocabulary };
         let read = |(k, term): (usize, &_)| {
-            let term: &str = AsRef::as_ref(term);
-            parse(term, &vocabulary).map_err(|error| (k, error))
+            parse(AsRef::as_ref(term), &vocabulary).map_err(|error| (k, error))
         };
         Ok(Self {
             name: name.to_owned(),
             place: site.place,
             at: site.at,
             prior,
-            terms: terms
-                .iter()
-                .enumerate()
-                .map(|(k, term)| read((k, term)))
-                .collect::<Result<_, _>>()?,
+            terms: terms.iter().enumerate().map(read).collect::<Result<_, _>>()?,
             parameters,
             covariates: vocabulary.covariates.to_vec(),
             composition: None,

@@ -2,7 +2,6 @@
 
 use super::expression::Parsed;
 use super::family::{At, Prior};
-use super::parameter::LawParameter;
 
 /// Parameter of an effect before it is resolved on an arm.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,4 +21,19 @@ pub struct EffectTerm {
     pub never_negative: bool,
     /// Declaration and bounds of a parameter inside formulas; `None` for a coefficient.
     pub inner: Option<LawParameter>,
+}
+
+/// Named parameter inside the formulas of a law, such as a time constant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawParameter {
+    /// Name in formulas.
+    pub name: String,
+    /// Value at which the fit starts, SI.
+    pub start: f64,
+    /// Smallest value, SI; `None` for no limit.
+    pub min: Option<f64>,
+    /// Largest value, SI; `None` for no limit.
+    pub max: Option<f64>,
+    /// Standard deviation (1 σ) of a Gaussian prior about the start value, SI; `None` for no prior.
+    pub sigma: Option<f64>,
 }

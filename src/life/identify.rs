@@ -10,7 +10,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 use super::assessment::{Assessment, assess};
 use super::causes::{Cause, CauseKind, Extended};
 use super::contradiction::{Contradiction, most_probable};
-use super::corrected::{MAX_TESTED_ROWS, tested};
 use super::drift;
 use super::earlier::Earlier;
 use super::error::PriorError;
@@ -22,8 +21,9 @@ use crate::fit::{
     self, ComparedParameter, Identification, Options, Placement, PriorComparison, SavedEstimate,
     Strategy,
 };
-use crate::measurement::{Dataset, Split};
-use crate::model::Model;
+use crate::measurement::{Dataset, Measurements, Split};
+use crate::model::{Model, Pose};
+use crate::numeric::lower_factor;
 use crate::observation::Observation;
 use crate::problem::Problem;
 use crate::quantity::Unit;
@@ -411,4 +411,58 @@ fn compare(
         has_raised_sigma: false,
         parameters: original.indices.iter().enumerate().map(compared).collect(),
     }
+}
+
+/// Maximum number of rows that are tested, evenly spaced among the new ones.
+pub(super) const MAX_TESTED_ROWS: usize = 80;
+/// Number of coordinates of a position.
+const AXES: usize = 3;
+/// Fraction of the noise variance that is added to the covariance of predictions, so that it is
+/// positive definite despite rounding.
+const JITTER: f64 = 1e-9;
+
+/// Result of the test, with what its causes refer to.
+struct CorrectedTest {
+    pub assessed: Assessment,
+    pub causes: Vec<Cause>,
+    pub extended: Extended,
+    pub rows: SensitiveRows,
+    /// Indices of the tested rows in their table.
+    pub places: Vec<usize>,
+}
+
+/// Tests rows that an earlier estimate predicted with its remainder, for changes about the full
+/// parameter vector `x`. Returns `None` if a number is not finite.
+///
+/// Each coordinate has an error of its prediction, with the covariance of parameters and remainder
+/// together, and noise. Without the misfit that the remainder corrects, the rows show changes that
+/// the parameters alone would hide.
+fn tested(
+    (problem, model, x): (&Problem, &Model, &DVector<f64>),
+    (table, placement): (&Measurements, &Placement),
+    predicted: PredictedRows,
+) -> Option<CorrectedTest> {
+    let PredictedRows { rows: places, residual, covariance, sigma } = predicted;
+    let extended = Extended::new(problem, model, x, [&placement.bases, &placement.targets]);
+    let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
+    let poses: Vec<Pose> = placement.oriented_poses(table, &places, (1.0, turn));
+    let poses = poses.into_iter().zip(&sigma).map(|(pose, &sigma)| Pose { sigma, ..pose });
+    let mut rows = SensitiveRows::new(&extended.model, poses.collect(), &extended.x);
+    rows.residual.fill(0.0);
+    for (k, value) in residual.iter().enumerate() {
+        rows.residual[rows.stride * (k / AXES) + k % AXES] = value / sigma[k / AXES];
+    }
+    let warmth = warmth(problem, table, &places);
+    let mut causes = extended.causes(problem, &mut rows, warmth.as_deref());
+    causes.retain(|cause| cause.kind != CauseKind::Other);
+    let first = rows.add_error_columns(AXES);
+    let mut whitened = DMatrix::from_fn(residual.len(), residual.len(), |i, j| {
+        covariance[(i, j)] / (sigma[i / AXES] * sigma[j / AXES])
+    });
+    (0..residual.len()).for_each(|k| whitened[(k, k)] += JITTER);
+    let lower = lower_factor(whitened)?;
+    let mut factor = DMatrix::zeros(rows.sensitivity.ncols(), residual.len());
+    factor.rows_mut(first, residual.len()).copy_from(&lower);
+    let assessed = assess(&rows, &factor, &causes, false)?;
+    Some(CorrectedTest { assessed, causes, extended, rows, places })
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, cells};
-use super::latin::decoded;
+use super::latin::{decoded, parsed};
 
 /// Beginning of the text of a table.
 pub(super) struct Beginning {
@@ -52,16 +52,10 @@ impl Beginning {
 
     /// Returns the indices of the columns that hold words, not only numbers.
     pub fn word_columns(&self) -> BTreeSet<usize> {
-        let is_word =
-            |cell: &String| !cell.is_empty() && cell.replace(',', ".").parse::<f64>().is_err();
-        let words_of = |row: Vec<String>| {
-            row.into_iter()
-                .enumerate()
-                .filter(|(_, cell)| is_word(cell))
-                .map(|(place, _)| place)
-                .collect::<Vec<_>>()
-        };
-        self.rows().into_iter().flat_map(words_of).collect()
+        let is_word = |cell: &String| !cell.is_empty() && parsed(cell).is_none();
+        let rows = self.rows();
+        let cells = rows.iter().flat_map(|row| row.iter().enumerate());
+        cells.filter(|(_, cell)| is_word(cell)).map(|(place, _)| place).collect()
     }
 }
 
@@ -69,7 +63,7 @@ impl Beginning {
 /// points that may separate thousands.
 fn mark(cell: &str) -> Option<Mark> {
     if cell.contains(',') {
-        return cell.replace(',', ".").parse::<f64>().is_ok().then_some(Mark::NotPoint);
+        return parsed(cell).map(|_| Mark::NotPoint);
     }
     let (whole, decimals) = cell.split_once('.')?;
     let is_group =

@@ -1,5 +1,6 @@
 //! Recognition of words in cells that should contain a number, for error messages.
 
+use super::latin::parsed;
 use crate::error::{TableErrorKind, shortened};
 
 /// Units that tables of other programs write into cells.
@@ -37,15 +38,14 @@ pub(super) fn other_notation(word: &str) -> Option<TableErrorKind> {
     {
         return Some(TableErrorKind::ThousandsSeparator { value });
     }
-    let number = |text: &str| text.replace(',', ".").parse::<f64>().ok();
     let with_e = word.replace(['D', 'd'], "E");
-    if with_e != word && number(&with_e).is_some() {
+    if with_e != word && parsed(&with_e).is_some() {
         return Some(TableErrorKind::FortranExponent { value, write: with_e });
     }
     let parts: Vec<f64> = unsigned
         .split([':', '°', '\'', '"', '′', '″', ' '])
         .filter(|part| !part.is_empty())
-        .map_while(number)
+        .map_while(parsed)
         .collect();
     let is_sexagesimal = unsigned.contains([':', '°'])
         && unsigned.chars().all(|c| c.is_ascii_digit() || ":°'\"′″ .,".contains(c))
@@ -73,7 +73,6 @@ pub(super) fn is_spreadsheet_date(word: &str) -> bool {
 /// Returns the unit that follows a number in the same cell, such as `°` in `118.1°`.
 pub(super) fn unit_behind(word: &str) -> Option<&'static str> {
     UNITS.into_iter().find(|unit| {
-        let number = word.strip_suffix(unit).map(|number| number.trim_end().replace(',', "."));
-        number.is_some_and(|number| number.parse::<f64>().is_ok())
+        word.strip_suffix(unit).is_some_and(|number| parsed(number.trim_end()).is_some())
     })
 }

@@ -2,7 +2,7 @@
 
 use std::io::{Read, Result};
 
-use super::latin::decoded;
+use super::latin::{decoded, parsed};
 use super::lines::Lines;
 use super::meaning::is_numbered_or_position;
 use crate::error::BYTE_ORDER_MARK_UTF8;
@@ -102,7 +102,7 @@ impl Layout {
                 cells(header.get(mark_before_names(header)?..)?, delimiter_of(header)).len();
             let is_row = |line: &str| {
                 let cells = cells(line, delimiter_of(header));
-                let is_number = |cell: &String| cell.replace(',', ".").parse::<f64>().is_ok();
+                let is_number = |cell: &String| parsed(cell).is_some();
                 cells.len() == count && cells.iter().filter(|cell| is_number(cell)).count() > 1
             };
             let (later, _) = has_known()?;

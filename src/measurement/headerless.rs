@@ -1,5 +1,6 @@
 //! Tables without a header, whose columns are selected by their places.
 
+use super::latin::parsed;
 use super::meaning::is_numbered_or_position;
 use crate::error::TableErrorKind;
 use crate::problem::{ColumnRule, ColumnSelector};
@@ -8,9 +9,7 @@ use crate::problem::{ColumnRule, ColumnSelector};
 /// column by its place in which the record has a number. The numbers of the record must not be 0,
 /// 1, 2, … or 1, 2, 3, …, which number the columns.
 pub(super) fn is_row_of_numbers(cells: &[String], rules: &[ColumnRule]) -> bool {
-    let number = |cell: &String| {
-        cell.replace(',', ".").parse::<f64>().ok().filter(|number| number.is_finite())
-    };
+    let number = |cell: &String| parsed(cell).filter(|number| number.is_finite());
     let cell = |rule: &ColumnRule| match rule.theirs {
         ColumnSelector::Place(place) => cells.get(place.checked_sub(1)?),
         _ => None,
@@ -26,13 +25,13 @@ pub(super) fn is_row_of_numbers(cells: &[String], rules: &[ColumnRule]) -> bool 
 
 /// Returns true if most names of a header are numbers, as in a table without a header.
 pub(super) fn holds_numbers(header: &[String]) -> bool {
-    let numbers = header.iter().filter(|name| name.replace(',', ".").parse::<f64>().is_ok());
+    let numbers = header.iter().filter(|name| parsed(name).is_some());
     header.len() > 2 && 2 * numbers.count() > header.len()
 }
 
 /// Returns the error of a table whose first line holds numbers.
 pub(super) fn no_header(header: &[String]) -> TableErrorKind {
-    let is_number = |name: &String| name.replace(',', ".").parse::<f64>().is_ok();
+    let is_number = |name: &String| parsed(name).is_some();
     // The name of a pose, such as P01, has a number, and that of a quantity has none.
     let is_quantity = |name: &String| {
         is_numbered_or_position(name) || !name.contains(|letter: char| letter.is_ascii_digit())

@@ -25,6 +25,7 @@ const MAX_PLAUSIBLE_MEDIAN_GAP: f64 = 0.5;
 const MIN_CHECKED_ROWS: usize = 4;
 
 /// Rows of the joint table, with the keys by which they are paired with measured rows.
+#[derive(Default)]
 pub(super) struct JoinedLog {
     rule: JoinRule,
     /// Place of the declaration in the problem.
@@ -105,28 +106,7 @@ impl JoinedLog {
     /// key column is missing, or a name occurs twice.
     pub fn read(log: &JointLog, problem: &Problem) -> Result<Self, InputError> {
         let dialect = &problem.data.dialect;
-        let mut joined = Self {
-            rule: log.by,
-            location: log.location.clone(),
-            header: Vec::new(),
-            format: None,
-            names: Vec::new(),
-            rows: Vec::new(),
-            of_name: HashMap::new(),
-            by_time: Vec::new(),
-            log_times: Vec::new(),
-            key: None,
-            requested: 0,
-            unpaired: Vec::new(),
-            paired: 0,
-            text_warnings: Vec::new(),
-            unpaired_names: Vec::new(),
-            name_columns: None,
-            unlike_pairs: Vec::new(),
-            times: Vec::new(),
-            clock: None,
-            timed_pairs: Vec::new(),
-        };
+        let mut joined = Self { rule: log.by, location: log.location.clone(), ..Self::default() };
         for file in &log.files {
             let kind = InputErrorKind::DataFileMissing { path: file.clone() };
             let missing = || log.location.clone().error(kind);

@@ -49,6 +49,11 @@ fn windows_1252(bytes: &[u8]) -> Option<String> {
     bytes.iter().enumerate().map(character).collect()
 }
 
+/// Returns the number that a text with a decimal point or comma states; `None` for other texts.
+pub(super) fn parsed(text: &str) -> Option<f64> {
+    text.replace(',', ".").parse().ok()
+}
+
 /// Decodes bytes in which a header is searched: as UTF-8, else as Windows-1252, else with
 /// replacement characters.
 pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, str> {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
-use crate::problem::{JointKind, Problem};
+use crate::problem::Problem;
 use crate::quantity::format::{decimals, number};
 
 /// Largest excess over a joint limit that counts as rounding \[rad\] or \[m\].
@@ -72,6 +72,11 @@ impl Commands<'_> {
 }
 
 impl Measurements {
+    /// Returns a warning about a column in a row.
+    pub(super) fn warning(&self, row: usize, key: impl Into<String>, kind: WarningKind) -> Warning {
+        Warning { location: self.location(row).with_key(key), kind }
+    }
+
     /// Returns a warning, located at the lowest temperature, if all temperatures are so high that
     /// they are probably in kelvins.
     pub(super) fn kelvins(&self) -> Option<Warning> {
@@ -92,10 +97,9 @@ impl Measurements {
         let distance = |value: f64| (value - 20.0).abs();
         let values = self.temperature.iter().flatten().enumerate();
         let (row, &value) = values.max_by(|a, b| distance(*a.1).total_cmp(&distance(*b.1)))?;
-        let location = self.location(row).with_key("temperature_C");
         let kind = WarningKind::UnusualTemperature { value: number(value, 1) };
         let is_unusual = distance(value) > MAX_TEMPERATURE_DISTANCE && self.kelvins().is_none();
-        is_unusual.then_some(Warning { location, kind })
+        is_unusual.then(|| self.warning(row, "temperature_C", kind))
     }
 
     /// Returns a warning if all positions are multiples of a step whose rounding errs by much more
@@ -130,8 +134,7 @@ impl Measurements {
             && problem.tool.payload_mass == 0.0
             && problem.is_elastic();
         let kind = WarningKind::NoPayloadColumn { mass: problem.tool.payload_mass.to_string() };
-        let location = self.location(0).with_key("payload_kg");
-        is_missing.then_some(Warning { location, kind })
+        is_missing.then(|| self.warning(0, "payload_kg", kind))
     }
 
     /// Returns a warning, located at the heaviest payload, if that is implausible for the arm.
@@ -144,8 +147,7 @@ impl Measurements {
             mass: heaviest.to_string(),
             arm: is_heavy_for_arm.then(|| format!("{arm:.1}")),
         };
-        let location = self.location(row).with_key("payload_kg");
-        (is_heavy_for_arm || heaviest > MAX_PAYLOAD).then_some(Warning { location, kind })
+        (is_heavy_for_arm || heaviest > MAX_PAYLOAD).then(|| self.warning(row, "payload_kg", kind))
     }
 
     /// Returns a warning for the first row that has the pose name, configuration, session, target
@@ -178,10 +180,9 @@ impl Measurements {
     /// session of its own.
     pub(super) fn session_per_row(&self) -> Option<Warning> {
         let rows = self.len();
-        let location = self.location(0).with_key("session");
         let kind = WarningKind::SessionPerRow { rows };
         (rows >= MIN_SESSION_ROWS && self.session.names.len() == rows)
-            .then_some(Warning { location, kind })
+            .then(|| self.warning(0, "session", kind))
     }
 
     /// Returns a warning, located at the first row, if all times are so large that they are
@@ -189,9 +190,8 @@ impl Measurements {
     pub(super) fn milliseconds(&self) -> Option<Warning> {
         let first = *self.time.first().filter(|_| self.time_measured)?;
         let is_late = self.time.iter().all(|time| *time > MAX_PLAUSIBLE_TIME);
-        let location = self.location(0).with_key("time");
         let kind = WarningKind::LooksLikeMilliseconds { value: format!("{first}") };
-        is_late.then_some(Warning { location, kind })
+        is_late.then(|| self.warning(0, "time", kind))
     }
 
     /// Returns a warning, located at the largest angle, if a column in radians exceeds
@@ -199,10 +199,7 @@ impl Measurements {
     pub(super) fn many_turns(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "rad"
-                && problem
-                    .joints
-                    .get(column.joint)
-                    .is_some_and(|joint| joint.command_kind() == JointKind::Revolute)
+                && problem.joints.get(column.joint).is_some_and(|joint| joint.takes_angle())
         };
         let value =
             |row: usize, joint: usize| self.configuration(row).get(joint).copied().unwrap_or(0.0);
@@ -218,8 +215,8 @@ impl Measurements {
             value: format!("{} = {}", column.name, column.shown(value(row, column.joint))),
             turns: format!("{turns:.0}"),
         };
-        let location = self.location(row).with_key(format!("joint {}", column.joint + 1));
-        (turns > MIN_SUSPICIOUS_TURNS).then_some(Warning { location, kind })
+        (turns > MIN_SUSPICIOUS_TURNS)
+            .then(|| self.warning(row, format!("joint {}", column.joint + 1), kind))
     }
 
     /// Returns a warning for each joint that is commanded beyond its declared range, located at the

@@ -31,11 +31,7 @@ impl Numbering {
         let numbers: Vec<usize> =
             names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
         let by_joint = || (0..problem.joints.len()).collect::<Vec<_>>();
-        let moving = problem
-            .joints
-            .iter()
-            .enumerate()
-            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
+        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.takes_command());
         let moving: Vec<usize> = moving.map(|(index, _)| index).collect();
         let by_number = moving.iter().all(|index| numbers.contains(&(index + 1)));
         let by_order = (1..=moving.len()).all(|number| numbers.contains(&number))
@@ -92,10 +88,7 @@ impl Numbering {
         }
         if let Some(number) = numbered(name, "approach") {
             let moves = |&joint: &usize| {
-                problem
-                    .joints
-                    .get(joint)
-                    .is_some_and(|joint| joint.command_kind() != JointKind::Fixed)
+                problem.joints.get(joint).is_some_and(|joint| joint.takes_command())
             };
             return match self.joint(number).filter(moves) {
                 Some(joint) => plain(Role::Approach(joint)),
@@ -171,7 +164,7 @@ pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
 }
 
 /// Conversion of a column `time` without a unit. Its cells must be dates, so numbers become NaN.
-pub(super) const DATE_CONVERSION: fn(f64) -> f64 = |_| f64::NAN;
+const DATE_CONVERSION: fn(f64) -> f64 = |_| f64::NAN;
 
 /// Returns the meaning of a column named after a joint, such as `shoulder_pan_joint_rad`. `None`
 /// for other columns, and for a joint name that several joints or another column have.
@@ -299,9 +292,7 @@ fn numbered(name: &str, prefix: &str) -> Option<usize> {
 
 /// Returns the warning that the column of a joint, counted from 1, is ignored because it is fixed.
 fn joint_ignored(problem: &Problem, joint: usize) -> WarningKind {
-    let moves = |joint: &usize| {
-        problem.joints.get(joint - 1).is_some_and(|of| of.command_kind() != JointKind::Fixed)
-    };
+    let moves = |joint: &usize| problem.joints.get(joint - 1).is_some_and(|of| of.takes_command());
     // In standard form, the last joint is the flange, which no [[joint]] declares.
     let declared = problem.joints.len() - usize::from(problem.standard_rows().is_some());
     WarningKind::JointIgnored { joint, declared, moving: (1..=declared).filter(moves).collect() }

@@ -9,10 +9,7 @@ mod appended;
 #[deny(clippy::indexing_slicing)]
 mod beginning;
 mod builder;
-#[deny(clippy::indexing_slicing)]
-mod cell_style;
 mod cell_words;
-mod cells;
 mod clocks;
 #[deny(clippy::indexing_slicing)]
 mod column_table;
@@ -38,8 +35,6 @@ mod latin;
 mod limits;
 #[deny(clippy::indexing_slicing)]
 mod lines;
-#[deny(clippy::indexing_slicing)]
-mod lost;
 #[deny(clippy::indexing_slicing)]
 mod mapped;
 #[deny(clippy::indexing_slicing)]
@@ -211,6 +206,11 @@ pub struct Labels {
     pub of_row: Vec<usize>,
 }
 
+/// Returns a number as 32 bits, the largest one instead of a larger number.
+fn narrow(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
+}
+
 impl Measurements {
     /// Returns the number of rows.
     pub fn len(&self) -> usize {
@@ -308,7 +308,6 @@ impl Measurements {
     /// session, as [`Self::session_starts`] returns them \[s\].
     pub(crate) fn setup(&self, row: usize, starts: &[f64]) -> PoseView<'_> {
         let session = self.session.of_row.get(row).copied().unwrap_or(0);
-        let narrow = u32::try_from(row).unwrap_or(u32::MAX);
         PoseView {
             configuration: self.configuration(row),
             payload: self.payload.as_ref().map(|column| &column[row]),
@@ -321,7 +320,7 @@ impl Measurements {
                 .as_ref()
                 .map(|column| &column[row * self.joints..(row + 1) * self.joints]),
             covariates: self.covariates_of(row),
-            past: LazyPast::row(self, narrow),
+            past: LazyPast::row(self, narrow(row)),
             offsets: None,
         }
     }
@@ -452,10 +451,9 @@ impl Measurements {
     /// Returns these rows followed by those of a table with the same columns, sessions and targets.
     #[must_use]
     pub(crate) fn concatenate(&self, other: &Self) -> Self {
-        let concatenated = |first: &[f64], second: &[f64]| [first, second].concat();
-        let both = |first: &Option<Vec<f64>>, second: &Option<Vec<f64>>| {
-            Some(concatenated(first.as_ref()?, second.as_ref()?))
-        };
+        fn both<T: Clone>(first: &Option<Vec<T>>, second: &Option<Vec<T>>) -> Option<Vec<T>> {
+            Some([first.as_deref()?, second.as_deref()?].concat())
+        }
         let mut joined = self.clone();
         joined.origin.extend(&other.origin);
         joined.configurations.extend(&other.configurations);
@@ -467,10 +465,7 @@ impl Measurements {
             joined.observations = [each(self), each(other)].concat();
         }
         joined.positions.extend(&other.positions);
-        joined.orientations = self
-            .orientations
-            .as_ref()
-            .and_then(|first| Some([first.as_slice(), other.orientations.as_deref()?].concat()));
+        joined.orientations = both(&self.orientations, &other.orientations);
         joined.sigma = both(&self.sigma, &other.sigma);
         joined.payload = both(&self.payload, &other.payload);
         joined.hoist = both(&self.hoist, &other.hoist);

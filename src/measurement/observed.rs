@@ -5,10 +5,10 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::Measurements;
 use super::columns::{self, Columns};
 use super::role::{POINT, POSITION, Role, is_declared};
 use super::table::Table;
+use super::{Measurements, narrow};
 use crate::error::{InputError, InputErrorKind};
 use crate::observation::{Content, Field, Kind, Needs, kinds};
 use crate::problem::fixture::unknown;
@@ -177,10 +177,7 @@ fn fixture(
     found.ok_or_else(|| {
         let names: Vec<&str> = of_kind().map(|(_, fixture)| fixture.name.as_str()).collect();
         let kind = unknown(word, name, &names);
-        match place {
-            Some(place) => table.cell_error(place, kind),
-            None => table.error(kind),
-        }
+        table.error_in(place, kind)
     })
 }
 
@@ -220,11 +217,7 @@ pub(super) fn check_target(
     if problem.targets.iter().any(|target| target.name == word) {
         return Ok(());
     }
-    let kind = problem.unknown_target(word);
-    Err(match place {
-        Some(place) => table.cell_error(place, kind),
-        None => table.error(kind),
-    })
+    Err(table.error_in(place, problem.unknown_target(word)))
 }
 
 /// Appends a row for each known distance between points that are measured or declared. Sets the
@@ -271,7 +264,10 @@ pub(super) fn add_known_distances(
         }
         if measurements.sigma_of(row).is_none() {
             match problem.sigma_of(observation) {
-                Some(sigma) => measurements.set_sigma(row, sigma),
+                Some(sigma) => {
+                    let columns = measurements.sigma.iter_mut();
+                    columns.flat_map(|column| column.get_mut(row)).for_each(|of| *of = sigma);
+                }
                 None => without = without.or(Some(observation)),
             }
         }
@@ -294,19 +290,15 @@ impl Measurements {
     /// unknown numbers.
     pub(super) fn check_contacts(&self, problem: &Problem) -> Result<(), InputError> {
         for (index, fixture) in problem.fixtures.iter().enumerate() {
-            let rows: Vec<usize> = (0..self.len())
-                .filter(|&row| self.observation(row).fixtures().contains(&Some(index)))
-                .filter(|&row| self.observation(row).is_of_arm())
-                .collect();
+            let is_at_it = |&row: &usize| {
+                let observation = self.observation(row);
+                observation.fixtures().contains(&Some(index)) && observation.is_of_arm()
+            };
+            let rows: Vec<usize> = (0..self.len()).filter(is_at_it).collect();
             let Some(&first) = rows.first() else { continue };
-            let distances_at_point = problem
-                .distances
-                .iter()
-                .filter(|distance| distance.between.contains(&index))
-                .count();
-            let measured =
-                rows.iter().map(|&row| self.observation(row).coordinates()).sum::<usize>()
-                    + distances_at_point;
+            let coordinates = rows.iter().map(|&row| self.observation(row).coordinates());
+            let distances = problem.distances.iter().filter(|of| of.between.contains(&index));
+            let measured = coordinates.sum::<usize>() + distances.count();
             let numbers = fixture.known.iter().filter(|known| known.is_none()).count();
             if numbers > 0 && measured <= numbers {
                 let (what, name) = (fixture.kind.word(), fixture.name.clone());
@@ -324,7 +316,6 @@ impl Measurements {
             self.files.push(file.to_owned());
             self.files.len() - 1
         });
-        let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let mut row = self.select(&[0]);
         row.origin = vec![(narrow(place), narrow(distance.location.line.unwrap_or(0)))];
         row.observations =
@@ -351,12 +342,5 @@ impl Measurements {
         let rows: Vec<usize> =
             (0..self.len()).filter(|&row| self.observation(row).is_of_arm()).collect();
         if rows.len() == self.len() { self } else { self.select(&rows) }
-    }
-
-    /// Sets the standard deviation of the noise of a row.
-    fn set_sigma(&mut self, row: usize, value: f64) {
-        if let Some(sigma) = self.sigma.as_mut().and_then(|column| column.get_mut(row)) {
-            *sigma = value;
-        }
     }
 }

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use super::Measurements;
 use super::limits::Commands;
 use crate::error::{Location, Warning, WarningKind};
-use crate::problem::{JointKind, Observation, Problem};
+use crate::numeric::range;
+use crate::problem::{Observation, Problem};
 
 /// Range of room temperatures, 15 °C to 35 °C, in degrees Fahrenheit.
 const ROOM_FAHRENHEIT: std::ops::RangeInclusive<f64> = 59.0..=95.0;
@@ -39,8 +40,8 @@ impl Measurements {
         let (row, least) = temperatures().enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let is_usual = temperatures().all(|value| ROOM_FAHRENHEIT.contains(&value));
         let kind = WarningKind::Fahrenheit { least: format!("{least}") };
-        let location = self.location(row).with_key("temperature_C");
-        (is_usual && reference <= MAX_ROOM_TEMPERATURE).then_some(Warning { location, kind })
+        (is_usual && reference <= MAX_ROOM_TEMPERATURE)
+            .then(|| self.warning(row, "temperature_C", kind))
     }
 
     /// Returns a warning, located at the first row, if the hoist forces are about the declared
@@ -57,8 +58,7 @@ impl Measurements {
             usual: format!("{usual}"),
             declared: format!("{declared}"),
         };
-        let location = self.location(0).with_key("hoist_N");
-        ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then_some(Warning { location, kind })
+        ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then(|| self.warning(0, "hoist_N", kind))
     }
 
     /// Returns a warning, located at the first payload, if the payloads are round numbers of
@@ -81,16 +81,13 @@ impl Measurements {
             newtons: format!("{newtons}"),
             kilograms: format!("{:.1}", newtons / GRAVITY),
         };
-        let location = self.location(row).with_key("payload_kg");
-        (different.len() > 1 && looks_like_weights).then_some(Warning { location, kind })
+        (different.len() > 1 && looks_like_weights).then(|| self.warning(row, "payload_kg", kind))
     }
 
     /// Returns a warning if the reference temperature is far beyond all temperatures.
     pub(super) fn far_reference(&self, problem: &Problem) -> Option<Warning> {
         let reference = problem.data.reference_temperature?;
-        let values = || self.temperature.iter().flatten().copied();
-        let (least, most) =
-            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let (least, most) = range(self.temperature.iter().flatten().copied());
         let distance = (least - reference).max(reference - most);
         let is_far = distance > MIN_FAR_REFERENCE.max(most - least) && distance.is_finite();
         let kind = WarningKind::FarReference {
@@ -142,8 +139,8 @@ impl Measurements {
             longest: format!("{:.3}", length(longest) * 1e3),
             links: format!("{links:.3}"),
         };
-        let location = self.location(longest).with_key("distance_mm");
-        (length(longest) < MIN_PLAUSIBLE_DISTANCE * links).then_some(Warning { location, kind })
+        (length(longest) < MIN_PLAUSIBLE_DISTANCE * links)
+            .then(|| self.warning(longest, "distance_mm", kind))
     }
 
     /// Returns a warning, located at the largest angle, if columns in degrees are probably in
@@ -151,10 +148,7 @@ impl Measurements {
     pub(super) fn few_degrees(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "deg"
-                && problem
-                    .joints
-                    .get(column.joint)
-                    .is_some_and(|joint| joint.command_kind() == JointKind::Revolute)
+                && problem.joints.get(column.joint).is_some_and(|joint| joint.takes_angle())
         };
         let is_wide = |column: &Commands| {
             let range = problem.joints.get(column.joint).map(|joint| joint.limits);
@@ -176,7 +170,7 @@ impl Measurements {
             rows.any(|value| value > 0.0)
         });
         let kind = WarningKind::FewDegrees { widest: format!("{widest:.1}") };
-        let location = self.location(row).with_key(format!("joint {}", joint + 1));
-        (widest <= TAU && least.count() > 1).then_some(Warning { location, kind })
+        (widest <= TAU && least.count() > 1)
+            .then(|| self.warning(row, format!("joint {}", joint + 1), kind))
     }
 }

@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::cells::{above_zero, direction, is_validation, not_negative};
 use super::columns::{Column, Columns, is_filled};
 use super::labels::{LabelsBuilder, PoseNames, stems};
 use super::observed::Observed;
 use super::orientation::Cells;
 use super::role::{POSITION, Role, is_declared};
-use super::table::Table;
-use super::{CommandColumn, Labels, Measurements, NestReading, RowOrder};
+use super::table::{Table, shortened};
+use super::{CommandColumn, Labels, Measurements, NestReading, narrow};
 use crate::error::{InputError, InputErrorKind, TableErrorKind};
 use crate::observation::{Content, Needs, kinds};
 use crate::problem::{JointSource, Problem, RotationKind};
@@ -51,14 +50,8 @@ impl RowsBuilder {
         let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
         let measurements = Measurements {
             files: files.to_vec(),
-            origin: Vec::new(),
             joints: problem.joints.len(),
-            configurations: Vec::new(),
             other_configurations: has_both_joint_sources(columns).then(Vec::new),
-            nests: Vec::new(),
-            observations: Vec::new(),
-            distance_names: Vec::new(),
-            positions: Vec::new(),
             position_measured: true,
             position_unit: columns
                 .read
@@ -70,13 +63,8 @@ impl RowsBuilder {
             payload: list(Role::Payload),
             hoist: list(Role::Hoist),
             temperature: list(Role::Temperature),
-            time: Vec::new(),
             time_measured: columns.has(Role::Time),
             approach: approach.then(Vec::new),
-            covariates: Vec::new(),
-            pose: None,
-            pose_names: None,
-            session: Labels::default(),
             target: (names_targets || columns.has(Role::Target)).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
             has_decimal_commas: table.style.decimal_comma && table.style.delimiter != ',',
@@ -85,8 +73,7 @@ impl RowsBuilder {
                 .iter()
                 .filter_map(|column| command(column, table))
                 .collect(),
-            warnings: Vec::new(),
-            order: RowOrder::default(),
+            ..Measurements::default()
         };
         let poses = PoseNames::new(columns.has(Role::Pose));
         let columns = columns
@@ -164,9 +151,8 @@ impl RowsBuilder {
         table: &Table,
         columns: &Columns,
     ) -> Result<(), InputError> {
-        let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let mut reading = NestReading {
-            origin: (narrow(file), narrow(table.line())),
+            origin: place_of_row(file, table.line()),
             name: name.to_owned(),
             position: Vector3::zeros(),
             time: None,
@@ -209,8 +195,7 @@ impl RowsBuilder {
         let measurements = &mut self.measurements;
         let joints = measurements.joints;
         let row = measurements.len();
-        let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-        measurements.origin.push((narrow(file), narrow(table.line())));
+        measurements.origin.push(place_of_row(file, table.line()));
         measurements.configurations.resize((row + 1) * joints, 0.0);
         if let Some(other) = &mut measurements.other_configurations {
             other.resize((row + 1) * joints, 0.0);
@@ -330,6 +315,11 @@ impl RowsBuilder {
     }
 }
 
+/// Returns index of a file and line in it as a row keeps them.
+pub(super) fn place_of_row(file: usize, line: usize) -> (u32, u32) {
+    (narrow(file), narrow(line))
+}
+
 /// Sets the element at index `place` of a list if it exists; an empty list stays empty.
 fn set(list: &mut [f64], place: usize, value: f64) {
     if let Some(element) = list.get_mut(place) {
@@ -348,12 +338,8 @@ fn push(list: &mut Option<Vec<f64>>, value: f64) {
 fn has_both_joint_sources(columns: &Columns) -> bool {
     let count = |reading: bool| {
         let of_joint = |column: &&Column| matches!(column.role, Role::Joint(_) | Role::Reading(_));
-        columns
-            .read
-            .iter()
-            .filter(of_joint)
-            .filter(|column| column.role.is_reading() == reading)
-            .count()
+        let joints = columns.read.iter().filter(of_joint);
+        joints.filter(|column| column.role.is_reading() == reading).count()
     };
     count(true) > 0 && count(true) == count(false)
 }
@@ -366,4 +352,63 @@ fn command(column: &Column, table: &Table) -> Option<CommandColumn> {
         name: table.name_of(column.place).to_owned(),
         unit: (column.to_si)(1.0),
     })
+}
+
+/// Reads a number from the current row's cell of `column`, which must be above zero; returns it in
+/// SI units.
+fn above_zero(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let value = table.number(column.place)?;
+    // A tiny length in millimetres may underflow to 0 in metres.
+    let converted = (column.to_si)(value);
+    if converted > 0.0 {
+        Ok(converted)
+    } else {
+        Err(table.cell_error(column.place, InputErrorKind::NotPositive { value }))
+    }
+}
+
+/// Reads a number from the current row's cell of `column`, which must not be negative; returns it
+/// in SI units.
+fn not_negative(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let value = table.number(column.place)?;
+    if value < 0.0 {
+        Err(table.cell_error(column.place, InputErrorKind::Negative { value }))
+    } else {
+        Ok((column.to_si)(value))
+    }
+}
+
+/// Reads a direction of approach from the current row's cell of `column`: −1, 0 or +1.
+pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let word = table.non_empty_text(column.place)?;
+    if word.chars().all(char::is_alphabetic) {
+        let kind = TableErrorKind::DirectionInWords { value: shortened(word) };
+        return Err(table.cell_error(column.place, kind));
+    }
+    let value = table.number(column.place)?;
+    if [-1.0, 0.0, 1.0].contains(&value) {
+        Ok(value)
+    } else {
+        Err(table.cell_error(column.place, TableErrorKind::NotADirection { value }))
+    }
+}
+
+/// Returns true if the current row's cell in the column with index `place` is the word
+/// `validation`, and false if it is `identification`; other words are errors.
+fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
+    match table.non_empty_text(place)? {
+        "validation" => Ok(true),
+        "identification" => Ok(false),
+        word => {
+            let meant = match word.to_lowercase().as_str() {
+                "validation" | "valid" | "val" | "test" | "held_out" | "held-out" | "holdout" => {
+                    Some("validation")
+                }
+                "identification" | "ident" | "train" | "training" | "fit" => Some("identification"),
+                _ => None,
+            };
+            let kind = TableErrorKind::UnknownSplit { word: shortened(word), meant };
+            Err(table.cell_error(place, kind))
+        }
+    }
 }

@@ -6,9 +6,8 @@ use std::sync::Arc;
 
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
-use super::appended::Appended;
+use super::appended::{Appended, CellStyle};
 use super::beginning::Beginning;
-use super::cell_style::CellStyle;
 use super::cell_words::{UNITS, has_thousands, is_spreadsheet_date, other_notation, unit_behind};
 use super::cut_end::LastCells;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
@@ -435,6 +434,14 @@ impl Table {
     pub fn cell_error(&self, place: usize, kind: impl Into<InputErrorKind>) -> InputError {
         let name = self.name_of(place);
         self.location(Some(place)).with_key(format!("column {}", shortened(name))).error(kind)
+    }
+
+    /// Creates an error about a cell of the current row, or about the whole row without a cell.
+    pub fn error_in(&self, place: Option<usize>, kind: impl Into<InputErrorKind>) -> InputError {
+        match place {
+            Some(place) => self.cell_error(place, kind),
+            None => self.error(kind),
+        }
     }
 
     /// Returns the location of a column in the header line, for errors.

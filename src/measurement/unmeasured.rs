@@ -1,5 +1,6 @@
 //! Errors of rows that contain no measurement: summaries, titles of pages, and missing positions.
 
+use super::latin::parsed;
 use super::table::{Table, shortened};
 use crate::error::{InputError, InputErrorKind, TableErrorKind};
 
@@ -12,8 +13,7 @@ impl Table {
     pub(super) fn is_line_of_words(&self) -> bool {
         let cells = || self.cells().iter().map(|cell| String::from_utf8_lossy(cell.trim_ascii()));
         let filled = || cells().filter(|cell| !cell.is_empty());
-        let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
-        let numbers = filled().filter(|cell| is_number(cell)).count();
+        let numbers = filled().filter(|cell| parsed(cell).is_some()).count();
         let begins_with_word =
             cells().next().is_some_and(|cell| cell.starts_with(|c: char| c.is_alphabetic()));
         begins_with_word && filled().count() > 2 * numbers

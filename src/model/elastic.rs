@@ -7,8 +7,7 @@ use nalgebra::Vector3;
 use num_dual::Dual64;
 
 use super::Model;
-use super::inputs::Input;
-use super::rows::Rows;
+use super::rows::{Input, Rows};
 use super::sites::set_site;
 use crate::mechanics::{AdjointSolver, Angle, Arm, Segment, Sensitivity, StaticState, Workspace};
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};

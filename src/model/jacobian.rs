@@ -7,21 +7,20 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Model;
 use super::command_terms::CommandTerms;
-use super::derivatives::{ArmDerivatives, BaseDerivatives, TargetDerivatives};
+use super::derivatives::{ArmDerivatives, BaseDerivatives, TargetDerivatives, angular_velocity};
 use super::elastic::ElasticDerivatives;
-use super::inputs::inputs;
 use super::instrument::Instrument;
 use super::load_moments::JacobianColumn;
-use super::orientation;
-use super::pose::Pose;
+use super::pose::{MeasuredOrientation, Pose};
 use super::predictor::fixtures_of;
 use super::rigid::RigidDerivatives;
-use super::rows::{Rows, clear_block};
+use super::rows::{Rows, clear_block, inputs};
 use super::tilt::TiltDerivatives;
 use crate::least_squares::Block;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::observation::{FixtureValues, MAX_FIXTURE_NUMBERS, Needs, Scene, Slopes};
-use crate::spatial::Frame;
+use crate::problem::PoseView;
+use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
 
 /// Writer of residuals and Jacobian rows at one parameter vector, used for every row.
 pub(super) struct JacobianWriter<'m> {
@@ -93,7 +92,7 @@ impl<'m> JacobianWriter<'m> {
             ArmDerivatives::Rigid(RigidDerivatives::new(&arm, inputs))
         };
         let point_rows = match (oriented, fixtures.is_empty()) {
-            (true, _) => orientation::ROWS_OF_FOUR_POINTS,
+            (true, _) => ROWS_OF_FOUR_POINTS,
             (false, false) => 3,
             (false, true) => 0,
         };
@@ -274,8 +273,8 @@ impl<'m> JacobianWriter<'m> {
         let reading = self.instrument.reading(&predicted, &pose.setup);
         rows.put(last_column, &(reading - pose.measured));
         if let Some(measured) = &pose.orientation {
-            let place = orientation::OrientedPose { setups, base, target, frame: &frame };
-            orientation::write(&mut self.arm, &mut self.points, &place, measured, (block, row + 3));
+            let place = OrientedPose { setups, base, target, frame: &frame };
+            write(&mut self.arm, &mut self.points, &place, measured, (block, row + 3));
         }
     }
 }
@@ -303,4 +302,66 @@ fn write_placement(
         }
     }
     position
+}
+
+/// Number of rows for the derivatives of four points: the target and the ends of its three axes, 1
+/// m long.
+const ROWS_OF_FOUR_POINTS: usize = 12;
+
+/// Pose, base and target at which an orientation is differentiated.
+struct OrientedPose<'a> {
+    /// Pose as commanded, and pose with the terms that add to its commands.
+    pub setups: (&'a PoseView<'a>, &'a PoseView<'a>),
+    /// Base of the arm.
+    pub base: &'a BaseDerivatives,
+    /// Target whose orientation is measured.
+    pub target: &'a TargetDerivatives,
+    /// Frame that carries the target, measuring frame.
+    pub frame: &'a Frame<f64>,
+}
+
+/// Writes the whitened residual log(R Rₚᵀ) / σ of measured R and predicted Rₚ and its derivatives
+/// into three rows of a block of zeros.
+///
+/// With eₖ the axes of Rₚ and deₖ their derivatives, Rₚ rotates by ω = ½ Σ eₖ × deₖ, and the
+/// residual r changes by −J⁻¹(r) ω ([`inverse_right_jacobian`]).
+fn write(
+    arm: &mut ArmDerivatives,
+    points: &mut Block,
+    place: &OrientedPose,
+    orientation: &MeasuredOrientation,
+    (block, row): (&mut Block, usize),
+) {
+    let OrientedPose { setups, base, target, frame } = *place;
+    clear_block(points);
+    let ends = target.axes.map(|axis| target.position + axis);
+    for (k, point) in std::iter::once(&target.position).chain(&ends).enumerate() {
+        let mut rows = Rows { block: points, row: 3 * k, scale: 1.0 };
+        // The equilibrium exists, because the position of the same row was predicted before.
+        if arm.write(setups, base, (target.joint, point), &mut rows).is_none() {
+            return;
+        }
+        for (column, slope) in base.point_slopes(&frame.point(point)) {
+            rows.put(column, &slope);
+        }
+    }
+    let axes = target.axes.map(|axis| frame.vector(&axis));
+    let error =
+        orientation.axes().map_or(Vector3::zeros(), |measured| rotation_between(&axes, &measured));
+    let slope = inverse_right_jacobian(&error) / -orientation.sigma;
+    let mut put = |column: usize, slopes: [Vector3<f64>; 3]| {
+        let velocity = angular_velocity(&axes, &slopes);
+        block.column_mut(column)[row..row + 3].copy_from_slice((slope * velocity).as_slice());
+    };
+    for column in 0..points.parameters() {
+        let column_of_points = points.column(column);
+        let point = |k: usize| Vector3::from_column_slice(&column_of_points[3 * k..3 * k + 3]);
+        put(column, [1, 2, 3].map(|k| point(k) - point(0)));
+    }
+    for (column, slopes) in target.axis_slopes() {
+        put(column, slopes.map(|axis| frame.vector(&axis)));
+    }
+    let last_column = block.parameters();
+    block.column_mut(last_column)[row..row + 3]
+        .copy_from_slice((error / orientation.sigma).as_slice());
 }

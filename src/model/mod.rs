@@ -12,12 +12,10 @@ pub mod effect;
 mod elastic;
 mod free_commands;
 mod harmonic_sum;
-mod inputs;
 mod instrument;
 mod jacobian;
 mod linear_model;
 mod load_moments;
-mod orientation;
 #[doc(hidden)]
 pub mod parameter;
 mod parts;

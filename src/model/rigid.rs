@@ -8,8 +8,7 @@
 use nalgebra::Vector3;
 use num_dual::Dual64;
 
-use super::inputs::Input;
-use super::rows::Rows;
+use super::rows::{Input, Rows};
 use crate::mechanics::{Angle, Arm, Coordinates, Joint, MOTION_LEN, MOTION_STARTS, Placement};
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{PoseView, Tree};

@@ -5,8 +5,7 @@ use num_dual::Dual64;
 
 use super::Model;
 use super::elastic::seed_arm;
-use super::inputs::Input;
-use super::rows::Rows;
+use super::rows::{Input, Rows};
 use crate::mechanics::{Arm, StaticState, Workspace};
 use crate::observation::{Observation, Scene};
 use crate::problem::PoseView;

@@ -216,7 +216,7 @@ impl ArgumentKind {
     pub(super) fn example(self, problem: &Problem) -> String {
         let joints = &problem.joints;
         let moving = || {
-            let takes = |(_, joint): &(usize, &Joint)| joint.command_kind() != JointKind::Fixed;
+            let takes = |(_, joint): &(usize, &Joint)| joint.takes_command();
             (1..).zip(joints).filter(takes)
         };
         let first = moving().next().map_or(1, |(number, _)| number);

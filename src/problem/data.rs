@@ -4,11 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::Problem;
-use super::detours::without_detours;
 use super::dialect::{self, Dialect};
 use super::item::Item;
-use super::joint_log::{self, JointLog};
-use super::joint_source::JointSource;
+use super::joint_log::{self, JointLog, JointSource, without_detours};
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::observation::{Needs, Observation, kinds};

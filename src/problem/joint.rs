@@ -57,6 +57,21 @@ impl Joint {
     pub fn command_kind(&self) -> JointKind {
         if self.mimic.is_some() { JointKind::Fixed } else { self.kind }
     }
+
+    /// Returns true if the joint takes a command.
+    pub(crate) fn takes_command(&self) -> bool {
+        self.command_kind() != JointKind::Fixed
+    }
+
+    /// Returns true if the command of the joint is an angle.
+    pub(crate) fn takes_angle(&self) -> bool {
+        self.command_kind() == JointKind::Revolute
+    }
+
+    /// Returns true if the command of the joint is a length.
+    pub(crate) fn takes_length(&self) -> bool {
+        self.command_kind() == JointKind::Prismatic
+    }
 }
 
 /// Transform `xyz_m` and `rpy_deg` of a fixed joint, in URDF convention: Txyz Rz(yaw) Ry(pitch)

@@ -1,10 +1,8 @@
 //! Reader of `joints = { files = […], by = … }`: a second table that holds the joint coordinates.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
-use super::detours::without_detours;
 use super::item::Item;
-use super::joint_source::JointSource;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
@@ -20,11 +18,12 @@ pub struct JointLog {
 }
 
 /// Rule that pairs the rows of two tables.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum JoinRule {
     /// Pairs rows with the same word in the column `pose`.
     Name,
     /// Pairs the k-th row of one table with the k-th row of the other.
+    #[default]
     Order,
     /// Pairs each row with the one nearest in time, at most `tolerance` apart \[s\].
     Time {
@@ -68,4 +67,32 @@ pub(super) fn read(
     let source = section.word("source", &JointSource::WORDS, &JointSource::EACH)?;
     section.finish()?;
     Ok((JointLog { files, by, location: item.location() }, source))
+}
+
+worded! {
+    /// Source of the configurations if a table has both commands and readings.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub enum JointSource: as_str {
+        /// Commanded joint coordinates: columns `q1_deg` …
+        #[default]
+        Commanded = "commanded";
+        /// Encoder readings: columns `q1_read_deg` …
+        Read = "read";
+    }
+}
+
+/// Returns a path without folders that a following `..` leaves again, if the shorter path leads to
+/// the same file.
+pub(super) fn without_detours(path: PathBuf) -> PathBuf {
+    let mut short = PathBuf::new();
+    for component in path.components() {
+        match (component, short.components().next_back()) {
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                short.pop();
+            }
+            _ => short.push(component),
+        }
+    }
+    let is_same = || Some(short.canonicalize().ok()? == path.canonicalize().ok()?);
+    if short != path && is_same() == Some(true) { short } else { path }
 }

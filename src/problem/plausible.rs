@@ -194,9 +194,9 @@ impl Problem {
         let bodies = || {
             self.joints.iter().flat_map(|joint| joint.bodies.iter().map(move |body| (joint, body)))
         };
-        let warning = |(joint, body): (&Joint, &Body), kind: WarningKind| {
-            let location = Location { excerpt: None, ..joint.location.clone() };
-            Warning { location: location.with_key(format!("body {}", body.name)), kind }
+        let warning = |(joint, body): (&Joint, &Body), kind: WarningKind| Warning {
+            location: joint.location.of_key(format!("body {}", body.name)),
+            kind,
         };
         let heavy = bodies().find(|(_, body)| body.mass > MAX_BODY_MASS).map(|found| {
             let mass = found.1.mass.to_string();
@@ -275,13 +275,12 @@ impl Problem {
             let beam = joint.beam.as_ref()?;
             let rigidity = beam.ei_y.into_iter().chain(beam.ei_z).fold(0.0, f64::max);
             let (radius, length) = ((rigidity / beam.ea?).sqrt(), joint.a.abs());
-            let location = Location { excerpt: None, ..joint.location.clone() };
             let key = format!("beam {}.EI", beam.name);
             let kind = WarningKind::StiffBeam {
                 radius: format!("{radius:.3}"),
                 length: format!("{length:.3}"),
             };
-            (radius > length).then(|| Warning { location: location.with_key(key), kind })
+            (radius > length).then(|| Warning { location: joint.location.of_key(key), kind })
         })
     }
 
@@ -291,11 +290,10 @@ impl Problem {
         self.joints.iter().find_map(|joint| {
             let beam = joint.beam.as_ref()?;
             let hoist = beam.hoist.as_ref()?;
-            let location = Location { excerpt: None, ..joint.location.clone() };
             let key = format!("beam {}.hoist.direction", beam.name);
             let pulls_down = hoist.direction.dot(&down) > MIN_DOWNWARD_COSINE;
             pulls_down.then(|| Warning {
-                location: location.with_key(key),
+                location: joint.location.of_key(key),
                 kind: WarningKind::HoistPullsDown,
             })
         })
@@ -351,8 +349,7 @@ impl Problem {
                 links: format!("{links:.3}"),
                 write: format!("{key}mm"),
             };
-            let location = Location { excerpt: None, ..location.clone() };
-            Warning { location: location.with_key(format!("{key}m")), kind }
+            Warning { location: location.of_key(format!("{key}m")), kind }
         };
         let place = |fixture: &Fixture| {
             let axes = fixture.known.iter().take(3).map(|known| known.unwrap_or(0.0).powi(2));
@@ -375,9 +372,8 @@ impl Problem {
         let is_tiny = |size: f64| size > 0.0 && size < MIN_MARKER;
         let tiny = self.fixtures.iter().find_map(|fixture| {
             let size = size(fixture).filter(|size| is_tiny(*size))?;
-            let location = Location { excerpt: None, ..fixture.location.clone() };
             let kind = WarningKind::TinyMarker { size: format!("{:.3}", size * 1e3) };
-            Some(Warning { location: location.with_key("points_mm"), kind })
+            Some(Warning { location: fixture.location.of_key("points_mm"), kind })
         });
         let short = self.fixtures.iter().find_map(|fixture| {
             let is_camera = fixture.kind == FixtureKind::Camera;
@@ -389,8 +385,7 @@ impl Problem {
                 focal: number(focal, 2),
                 width: format!("{width:.0}"),
             };
-            let location = Location { excerpt: None, ..fixture.location.clone() };
-            let location = location.with_key("focal_px");
+            let location = fixture.location.of_key("focal_px");
             (focal < MIN_FOCAL_LENGTH * width).then_some(Warning { location, kind })
         });
         let far = far.into_iter().chain(long).filter(|_| links > 0.0);

@@ -13,8 +13,9 @@ use super::rules::SelectionRules;
 use crate::fit::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::{DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
+use crate::numeric::range;
 use crate::observation::Needs;
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
 use crate::residual_tests::CovariateValues;
 
@@ -45,11 +46,11 @@ pub(super) struct Data<'a> {
 }
 
 /// Cached laws by key.
-pub(super) type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
+type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
 
 /// Key of cached laws: names of the sites, names of the other hypotheses assumed, poses left out,
 /// and names of the fitted effects.
-pub(super) type ProposalKey = (String, Vec<String>, Vec<usize>, Vec<String>);
+type ProposalKey = (String, Vec<String>, Vec<usize>, Vec<String>);
 
 /// Number of points in images that count as one pose in the limit of the rows of evidence. A point
 /// has less information than a position, and a view has many.
@@ -84,16 +85,6 @@ impl<'a> Data<'a> {
             stop: Stop::default(),
             proposed: Proposed::default(),
         }
-    }
-
-    /// Adds effects that the search considers in addition to the catalogue.
-    pub fn with_candidates(self, candidates: &'a [Effect]) -> Self {
-        Self { candidates, ..self }
-    }
-
-    /// Sets the request that stops the evaluation of evidence.
-    pub fn with_stop(self, stop: Stop) -> Self {
-        Self { stop, ..self }
     }
 
     /// Returns the indices of the identification rows in the table.
@@ -133,11 +124,6 @@ impl<'a> Data<'a> {
     /// Collects which quantities the identification rows record, and their ranges; these decide
     /// which effects the rows can show.
     pub fn conditions(&self, problem: &Problem) -> DataCoverage {
-        fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                (low.min(value), high.max(value))
-            })
-        }
         let measurements = self.measurements;
         let column = |joint: usize| {
             range(self.rows().iter().map(move |&row| measurements.configuration(row)[joint]))
@@ -163,8 +149,7 @@ impl<'a> Data<'a> {
             },
             approach: measurements.approach.is_some(),
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
-            payload: payload
-                .map_or([problem.tool.payload_mass; 2].into(), |masses| range(masses.into_iter())),
+            payload: payload.map_or([problem.tool.payload_mass; 2].into(), |masses| range(masses)),
             ranges: (0..n).map(column).collect(),
             covariates: self.declared_covariates().map(varies).collect(),
             times: self.shift_times(),
@@ -207,11 +192,7 @@ impl<'a> Data<'a> {
     /// identification row.
     pub fn covariates(&self, problem: &Problem) -> Vec<CovariateValues> {
         let measurements = self.measurements;
-        let moving = problem
-            .joints
-            .iter()
-            .enumerate()
-            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
+        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.takes_command());
         let joint = |(index, _): (usize, _)| CovariateValues {
             covariate: Covariate::Command(index),
             values: self.rows().iter().map(|&row| measurements.configuration(row)[index]).collect(),

@@ -45,7 +45,7 @@ pub(super) struct Fitted {
     /// Indices in the model of the fitted parameters that are not at a bound.
     pub unknowns: Vec<usize>,
     /// Coefficients of the active constraints, shape = (constraints, unknowns).
-    active: DMatrix<f64>,
+    pub active: DMatrix<f64>,
     /// Standard deviation (1 σ) of a measured coordinate in rows without a declared σ \[m\].
     pub sigma: f64,
     /// Table indices of the outliers, which get practically no weight in the linear neighbourhood
@@ -99,11 +99,7 @@ impl Fitted {
         let unknowns: Vec<usize> = (0..model.parameters.len()).filter(free).collect();
         let coefficient = |i: usize, j: usize| -> f64 {
             let terms = &model.constraints[found.active_constraints[i].constraint].terms;
-            terms
-                .iter()
-                .filter(|(k, _)| *k == unknowns[j])
-                .map(|(_, coefficient)| coefficient)
-                .sum()
+            terms.iter().filter(|(k, _)| *k == unknowns[j]).map(|(_, of_term)| of_term).sum()
         };
         let active = DMatrix::from_fn(found.active_constraints.len(), unknowns.len(), coefficient);
         let sigma = match found.noise {
@@ -116,7 +112,7 @@ impl Fitted {
         };
         let outliers_of_fit: Vec<usize> =
             found.outliers.iter().map(|outlier| outlier.row).collect();
-        let (at_rows, derivatives) = (OnceLock::new(), Arc::default());
+        let (set_aside, at_rows, derivatives) = (Vec::new(), OnceLock::new(), Arc::default());
         let mut fitted = Self {
             problem,
             model,
@@ -124,7 +120,7 @@ impl Fitted {
             unknowns,
             active,
             sigma,
-            set_aside: Vec::new(),
+            set_aside,
             at_rows,
             derivatives,
         };
@@ -215,11 +211,6 @@ impl Fitted {
         poses
     }
 
-    /// Returns the coefficients of the active constraints, shape = (constraints, unknowns).
-    pub fn active(&self) -> &DMatrix<f64> {
-        &self.active
-    }
-
     /// Returns measured − predicted of the rows with the indices `rows`, measuring frame \[m\].
     pub fn errors(&self, data: &Data, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.model.residuals(self.poses(data, rows), &self.found.x)
@@ -295,11 +286,6 @@ impl Fitted {
         }
         let new = Arc::new(self.neighbourhood(&self.linearised(data, &[])));
         Arc::clone(self.at_rows.get_or_init(|| new))
-    }
-
-    /// Returns this fit with no row treated as an outlier.
-    pub fn with_all_rows(&self) -> Self {
-        self.with_outliers(Vec::new())
     }
 
     /// Returns this fit with the table rows `rows`, and no others, treated as outliers. The
@@ -382,11 +368,8 @@ impl Fitted {
 
     /// Returns the indices of an effect's parameters among the unknowns.
     pub fn unknowns_of(&self, effect: &Effect) -> Vec<usize> {
-        let parameters = self.parameters_of(effect);
-        parameters
-            .iter()
-            .filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k))
-            .collect()
+        let place = |k: &usize| self.unknowns.iter().position(|unknown| unknown == k);
+        self.parameters_of(effect).iter().filter_map(place).collect()
     }
 
     /// Returns the indices of an effect's parameters in the model.
@@ -459,13 +442,11 @@ fn find_outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
 fn squared_distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
     let (whole, residual) = (linearised.fitted(), linearised.residual());
     let (mut columns, mut here) = (whole.clone(), residual.clone());
-    for &pose in aside {
-        columns.rows_mut(3 * pose, 3).unscale_mut(SIGMA_FACTOR_OF_OUTLIERS);
-        here.rows_mut(3 * pose, 3).unscale_mut(SIGMA_FACTOR_OF_OUTLIERS);
-    }
     let mut is_aside = vec![false; residual.len() / 3];
     for &pose in aside {
         is_aside[pose] = true;
+        columns.rows_mut(3 * pose, 3).unscale_mut(SIGMA_FACTOR_OF_OUTLIERS);
+        here.rows_mut(3 * pose, 3).unscale_mut(SIGMA_FACTOR_OF_OUTLIERS);
     }
     let unknowns = fitted.unknowns_without(linearised, &[], 1.0);
     let fit = LinearNeighbourhood::new(&columns, &here, &unknowns, linearised.empty());
@@ -481,13 +462,10 @@ fn squared_distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) 
         };
         covariance.cholesky().map_or(0.0, |factor| r.dot(&factor.solve(&r)))
     };
-    let numbers = |pose: usize| linearised.coordinates(pose);
     let squares: Vec<f64> = (0..left.len() / 3).map(square).collect();
-    let mut ratios: Vec<f64> = squares
-        .iter()
-        .enumerate()
-        .map(|(pose, square)| square / MEDIAN_OF_SQUARES[numbers(pose) - 1])
-        .collect();
+    let usual = |pose: usize| MEDIAN_OF_SQUARES[linearised.coordinates(pose) - 1];
+    let ratios = squares.iter().enumerate().map(|(pose, square)| square / usual(pose));
+    let mut ratios: Vec<f64> = ratios.collect();
     ratios.sort_by(|a, b| b.total_cmp(a));
     // The scatter is at least the declared σ; relative to rounding errors alone, every row would
     // be an outlier.

@@ -3,7 +3,7 @@
 
 use crate::model::effect;
 use crate::model::parameter::{Regressor, rule_of};
-use crate::problem::{Effect, Freedom, JointKind, ParameterRule, Problem, Quantities};
+use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 use crate::quantity::Unit;
 
 /// Smallest number of orders of a joint's harmonics that are treated as one periodic error, whose
@@ -84,8 +84,8 @@ pub(super) fn harmonic_order(regressor: &Regressor) -> Option<u32> {
 /// Returns true if a common prior on angles can apply to all harmonics: no declared harmonic
 /// belongs to a prismatic joint, and no rule of `[parameters]` matches a harmonic.
 pub(super) fn admits_common_prior(problem: &Problem) -> bool {
-    let joints = (1..=problem.joints.len())
-        .filter(|&joint| problem.joints[joint - 1].command_kind() == JointKind::Revolute);
+    let joints =
+        (1..=problem.joints.len()).filter(|&joint| problem.joints[joint - 1].takes_angle());
     let possible = joints.flat_map(|joint| {
         Effect::JointHarmonic { joint, orders: vec![1, 2, 3] }.parameters(problem)
     });

@@ -92,7 +92,7 @@ pub fn trace_by(
     rules: &SelectionRules,
 ) -> Result<Trace, IdentifyError> {
     rules.check()?;
-    let data = Data::new(problem, data, rules).with_candidates(&options.candidates);
+    let data = Data { candidates: &options.candidates, ..Data::new(problem, data, rules) };
     // Evidence is evaluated for positions only, so only positions are fitted.
     let fitted = Fitted::new(problem.positions_alone(), &data, options)?;
     Ok(Trace { evidence: evaluate(&fitted, &data, &[]), ..trace_fit(&fitted, &data) })
@@ -152,7 +152,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
             separating_pose(&scan.linear, [&linearised, there], &poses, (candidate, other))
         });
         Ranked {
-            effect: scan.effects[tried.index].clone(),
+            effect: candidate.clone(),
             p_value: tried.corrected,
             f: (tried.gain.f, tried.gain.freedom),
             gain: rms(scan.linear.sums().squares)

@@ -149,7 +149,7 @@ fn correction(
     // The peak of a narrow function may have been treated as outliers. Predictions of left-out
     // poses distinguish the two.
     let may_hide_peak = fitted.problem.robust.is_none() && !fitted.set_aside.is_empty();
-    let with_all_rows = may_hide_peak.then(|| fitted.with_all_rows());
+    let with_all_rows = may_hide_peak.then(|| fitted.with_outliers(Vec::new()));
     let fitted = with_all_rows.as_ref().unwrap_or(fitted);
     let (here, there) = (data.rows(), &data.split.held_out);
     if there.is_empty() {

@@ -10,13 +10,12 @@ mod mistake;
 mod parse;
 mod print;
 mod tree;
-mod vocabulary;
 
 pub(crate) use dimension::Per;
 pub use mistake::{FormulaError, Mistake};
 pub(crate) use parse::Parsed;
+pub use parse::Vocabulary;
 pub use parse::parse;
 pub use print::Names;
 pub use tree::Expression;
 pub(crate) use tree::{Function, Operator};
-pub use vocabulary::Vocabulary;

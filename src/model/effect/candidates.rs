@@ -73,14 +73,14 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
             let found = (1..).zip(&problem.joints).filter(|(_, joint)| is_it(joint));
             found.map(|(number, _)| Argument::Joint(number)).collect()
         };
-        let takes = |joint: &Joint| joint.command_kind() != JointKind::Fixed;
+        let takes = |joint: &Joint| joint.takes_command();
         let values = match kind {
             ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint | ArgumentKind::LoadedJoint => {
                 joints(&|_| true)
             }
             ArgumentKind::MovingJoint | ArgumentKind::OtherJoint => joints(&takes),
             ArgumentKind::TurningJoint | ArgumentKind::RelievedJoint => {
-                joints(&|joint| joint.command_kind() == JointKind::Revolute)
+                joints(&|joint| joint.takes_angle())
             }
             ArgumentKind::SlidingJoint => {
                 joints(&|joint| takes(joint) && joint.kind == JointKind::Prismatic)
@@ -207,8 +207,8 @@ impl Effect {
         let joint = || problem.joints.get(self.joint()?.checked_sub(1)?);
         let is = |is_it: fn(&Joint) -> bool| joint().is_some_and(is_it);
         match only {
-            Only::Turning => is(|joint| joint.command_kind() == JointKind::Revolute),
-            Only::Commanded => is(|joint| joint.command_kind() != JointKind::Fixed),
+            Only::Turning => is(|joint| joint.takes_angle()),
+            Only::Commanded => is(|joint| joint.takes_command()),
             Only::RigidJoint => is(|joint| joint.stiffness.is_none()),
             Only::Link => is(|joint| joint.a != 0.0),
             Only::RigidLink => is(|joint| {

@@ -8,7 +8,6 @@ mod candidates;
 mod chance;
 mod coverage;
 mod place;
-mod prior;
 mod terms;
 
 pub(crate) use candidates::Candidate;

@@ -206,9 +206,8 @@ impl<'a, 'l> Columns<'a, 'l> {
     fn recorded_covariates(&self) -> Vec<SampledCovariate> {
         let poses = self.linearised.poses();
         let joints = &self.problem.joints;
-        let moving: Vec<usize> = (0..joints.len())
-            .filter(|&joint| joints[joint].command_kind() != JointKind::Fixed)
-            .collect();
+        let moving: Vec<usize> =
+            (0..joints.len()).filter(|&joint| joints[joint].takes_command()).collect();
         let mut covariates: Vec<(Covariate, Vec<f64>)> =
             moving.iter().map(|&joint| (Covariate::Command(joint), self.command(joint))).collect();
         let mut add = |covariate: Covariate, of: &dyn Fn(&Pose) -> Option<f64>| {

@@ -39,12 +39,8 @@ impl Columns<'_, '_> {
                 - scaled[..self.evidence_poses].iter().sum::<f64>()
                     / self.evidence_poses.max(1) as f64
         });
-        let hypothesis = |kind| Hypothesis {
-            kind,
-            site: Site::Measurement,
-            coordinate: None,
-            depends_on: vec![Covariate::Position],
-        };
+        let hypothesis =
+            |kind| Hypothesis::new(kind, Site::Measurement, None, vec![Covariate::Position]);
         // If the strain of the frame is a candidate, it is the linear law of the position.
         let strain =
             |candidate: &Candidate| candidate.hypothesis.effect() == Some(&Effect::FrameStrain);
@@ -66,12 +62,12 @@ impl Columns<'_, '_> {
         at: &[&DVector<f64>],
         of: &SampledCovariate,
     ) {
-        let hypothesis = Hypothesis {
-            kind: HypothesisKind::Wandering,
-            site: Site::Measurement,
-            coordinate: Some(site),
-            depends_on: vec![of.covariate.clone()],
-        };
+        let hypothesis = Hypothesis::new(
+            HypothesisKind::Wandering,
+            Site::Measurement,
+            Some(site),
+            vec![of.covariate.clone()],
+        );
         for (variant, &length) in ROUGH_LENGTHS.iter().enumerate() {
             if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
                 self.add_variant("smooth in the measurement", &hypothesis, variant, || {
@@ -106,12 +102,7 @@ impl Columns<'_, '_> {
             return;
         }
         let groups = (0..poses.len()).map(|row| numbers.get(row).copied()).collect();
-        let hypothesis = Hypothesis {
-            kind: HypothesisKind::PerPose,
-            site: Site::Arm,
-            coordinate: None,
-            depends_on: Vec::new(),
-        };
+        let hypothesis = Hypothesis::new(HypothesisKind::PerPose, Site::Arm, None, Vec::new());
         let design = || Design::Grouped { levers: DMatrix::from_columns(&axes), groups };
         self.add_design("per pose", 1.0, hypothesis, design);
     }

@@ -56,15 +56,8 @@ pub(super) fn finer_candidates(
             // two members.
             let place =
                 |k: usize| hypotheses.candidates[k].hypothesis.effect().map(Effect::name_and_place);
-            let without_member =
-                set.members.iter().copied().filter(|&other| other != member).collect();
-            let without_alike = set
-                .members
-                .iter()
-                .copied()
-                .filter(|&other| place(other) != place(member))
-                .collect();
-            let mut reduced_sets: Vec<Vec<usize>> = vec![without_member, without_alike];
+            let without_alike = set.without(|other| place(other) == place(member));
+            let mut reduced_sets = vec![set.without(|other| other == member), without_alike];
             reduced_sets.dedup();
             for rest in &reduced_sets {
                 let Some(left) = reduced_by(rest, products) else { continue };
@@ -81,9 +74,7 @@ pub(super) fn finer_candidates(
                     if residual_model.stop.is_requested() {
                         break;
                     }
-                    for (candidate, odds) in
-                        std::iter::zip(near.iter(), left.ln_odds_of(&blocks_of(&near)))
-                    {
+                    for (candidate, odds) in near.iter().zip(left.ln_odds_of(&blocks_of(&near))) {
                         if odds > least {
                             (best, least) = (Some(candidate.clone()), odds);
                         }

@@ -11,7 +11,7 @@ use super::candidate::Candidate;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Products, ReducedProblem};
-use super::search::{EvaluatedSet, reduced_by};
+use super::search::{EvaluatedSet, reduced_by, sorted};
 use super::sites::tool_site;
 use super::waves::is_free;
 use crate::laws::expression::Vocabulary;
@@ -194,9 +194,7 @@ fn places(
     for set in evaluated_sets.iter().filter(|set| !products.has_gear(&set.members)) {
         let joints: BTreeSet<usize> = set.members.iter().filter_map(|&member| of(member)).collect();
         for joint in joints {
-            let mut other_members: Vec<usize> =
-                set.members.iter().copied().filter(|&member| of(member) != Some(joint)).collect();
-            other_members.sort_unstable();
+            let other_members = sorted(&set.without(|member| of(member) == Some(joint)));
             *probability_of_rest.entry((joint, other_members)).or_default() += set.probability;
         }
     }
@@ -215,6 +213,14 @@ fn places(
     found.into_iter().map(|(found, _)| place(found)).collect()
 }
 
+/// Returns the most probable set if laws are searched in place of its members at other sites than
+/// joint coordinates.
+fn searched_set<'s>(sets: &'s [EvaluatedSet], products: &Products) -> Option<&'s EvaluatedSet> {
+    sets.first().filter(|set| {
+        set.probability > MIN_SET_PROBABILITIES[1] && !products.has_gear(&set.members)
+    })
+}
+
 /// Returns the sites other than joint coordinates at which laws are searched. The laws replace
 /// those members of the most probable set that act there. The sites are tool, measurement and base,
 /// and small motions of a joint at which a function without a law acts. Returns `None` if no member
@@ -225,9 +231,7 @@ fn elsewhere(
     products: &Products,
 ) -> Option<SitesToSearch> {
     let problem = hypotheses.linearised.problem();
-    let set = evaluated_sets.first().filter(|set| {
-        set.probability > MIN_SET_PROBABILITIES[1] && !products.has_gear(&set.members)
-    })?;
+    let set = searched_set(evaluated_sets, products)?;
     let of = |member: usize| &hypotheses.candidates[member].hypothesis;
     let is_elsewhere = |member: usize| {
         let hypothesis = of(member);
@@ -249,9 +253,7 @@ fn elsewhere(
     if members.is_empty() {
         return None;
     }
-    let mut other_members: Vec<usize> =
-        set.members.iter().copied().filter(|member| !members.contains(member)).collect();
-    other_members.sort_unstable();
+    let other_members = sorted(&set.without(|member| members.contains(&member)));
     let mut sites: Vec<LawAt> = Vec::new();
     let mut add = |name: String, lever: ParameterSite| {
         sites.push(LawAt { name, place: FormulaSite::Elsewhere, lever });
@@ -285,16 +287,13 @@ fn warming_links(
 ) -> Option<SitesToSearch> {
     let problem = hypotheses.linearised.problem();
     problem.data.reference_temperature?;
-    let set = evaluated_sets.first().filter(|set| {
-        set.probability > MIN_SET_PROBABILITIES[1] && !products.has_gear(&set.members)
-    })?;
+    let set = searched_set(evaluated_sets, products)?;
     let depends_on_temperature = |member: usize| {
         let hypothesis = &hypotheses.candidates[member].hypothesis;
         matches!(hypothesis.site, Site::Joint(_) | Site::LinkBefore(_))
             && hypothesis.depends_on.contains(&Covariate::Temperature)
     };
-    let (members, other_members): (Vec<usize>, Vec<usize>) =
-        set.members.iter().partition(|&&member| depends_on_temperature(member));
+    let other_members = sorted(&set.without(depends_on_temperature));
     let names = ["strain", "curvature_y", "curvature_z"];
     let of_joint = |(joint, of): (usize, &Joint)| {
         let beam = of.beam.as_ref()?;
@@ -307,9 +306,8 @@ fn warming_links(
     };
     let sites: Vec<LawAt> =
         problem.joints.iter().enumerate().filter_map(of_joint).flatten().collect();
-    let mut other_members = other_members;
-    other_members.sort_unstable();
-    (!members.is_empty() && !sites.is_empty()).then_some(SitesToSearch { sites, other_members })
+    let replaces_some = other_members.len() < set.members.len();
+    (replaces_some && !sites.is_empty()).then_some(SitesToSearch { sites, other_members })
 }
 
 /// Search for formulas that explain the residual that some members of a set leave.
@@ -327,16 +325,11 @@ impl Search<'_, '_, '_> {
         let poses = self.hypotheses.linearised.poses();
         let kept: Vec<usize> =
             (0..poses.len()).filter(|pose| !self.left_out.contains(pose)).collect();
-        let kept: Vec<usize> = if kept.len() > MAX_POSES {
-            (0..MAX_POSES).map(|k| kept[k * kept.len() / MAX_POSES]).collect()
-        } else {
-            kept
-        };
+        let count = kept.len().min(MAX_POSES);
+        let kept: Vec<usize> = (0..count).map(|k| kept[k * kept.len() / count]).collect();
         let dropped: Vec<usize> = (0..poses.len()).filter(|pose| !kept.contains(pose)).collect();
         if dropped.len() == self.left_out.len() {
-            let reduced = reduced_by(other_members, products);
-            return reduced
-                .map_or_else(Vec::new, |reduced| self.best(sites, &reduced, products, &kept));
+            return self.best(sites, (products, other_members), &kept);
         }
         let members: Vec<&Candidate> =
             other_members.iter().map(|&member| &self.hypotheses.candidates[member]).collect();
@@ -347,21 +340,21 @@ impl Search<'_, '_, '_> {
         };
         let products = Products::new(&blocks, &residual_model);
         let all_blocks: Vec<usize> = (0..blocks.len()).collect();
-        let reduced = reduced_by(&all_blocks, &products);
-        reduced.map_or_else(Vec::new, |reduced| self.best(sites, &reduced, &products, &kept))
+        self.best(sites, (&products, &all_blocks), &kept)
     }
 
     /// Returns the best laws of all sites that the fit does not contain, those of one site in the
     /// order of their probability.
+    /// Returns none if the other members of the set cannot be fitted.
     fn best(
         &self,
         sites: &[LawAt],
-        reduced: &ReducedProblem,
-        products: &Products,
+        (products, other_members): (&Products, &[usize]),
         kept: &[usize],
     ) -> Vec<Effect> {
+        let Some(reduced) = reduced_by(other_members, products) else { return Vec::new() };
         let of_site = |at: &LawAt| {
-            let proposals = self.proposals(at, (reduced, products), kept);
+            let proposals = self.proposals(at, (&reduced, products), kept);
             proposals.into_iter().map(|proposal| (at.clone(), proposal)).collect::<Vec<_>>()
         };
         let mut laws_at_sites: Vec<(LawAt, Proposal)> = sites.iter().flat_map(of_site).collect();

@@ -36,7 +36,7 @@ pub(super) fn limits(
         found.estimates[k].at_bound.is_some() && found.unknowns.contains(&found.estimates[k].name)
     };
     let at_bound: Vec<usize> = (0..found.estimates.len()).filter(is_at_bound).collect();
-    let count = at_bound.len() + fitted.active().nrows();
+    let count = at_bound.len() + fitted.active.nrows();
     if count == 0 {
         return Vec::new();
     }
@@ -47,12 +47,8 @@ pub(super) fn limits(
             columns.rows(0, 3 * evidence_poses).norm() / ((3 * evidence_poses) as f64).sqrt();
         let coefficients =
             Coefficients { largest: vec![largest * length], ..Coefficients::default() };
-        let hypothesis = Hypothesis {
-            kind: HypothesisKind::Limit(words),
-            site: Site::of(site),
-            coordinate: None,
-            depends_on: Vec::new(),
-        };
+        let hypothesis =
+            Hypothesis::new(HypothesisKind::Limit(words), Site::of(site), None, Vec::new());
         let design = Design::Dense(columns).scaled(evidence_poses)?;
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     };
@@ -68,13 +64,10 @@ pub(super) fn limits(
         )
     });
     let fitted_columns = linearised.fitted().columns(0, fitted.unknowns.len()).into_owned();
-    let active = fitted.active();
+    let active = &fitted.active;
     // A matrix without rows has no singular value decomposition.
-    let directions = if active.is_empty() {
-        None
-    } else {
-        active.clone().pseudo_inverse(MIN_SINGULAR_VALUE).ok()
-    };
+    let decomposed = Some(active).filter(|active| !active.is_empty()).cloned();
+    let directions = decomposed.and_then(|active| active.pseudo_inverse(MIN_SINGULAR_VALUE).ok());
     let directions = directions.unwrap_or_default();
     let constraints =
         found.active_constraints.iter().zip(directions.column_iter()).zip(active.row_iter());

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION};
 use super::hypotheses::Hypotheses;
 use super::products::Products;
-use super::search::{EvaluatedSet, reduced_by};
+use super::search::{EvaluatedSet, reduced_by, sorted};
 use super::waves::is_free;
 use crate::numeric::parallel;
 use crate::problem::Effect;
@@ -43,11 +43,8 @@ pub(super) fn promising(
             .map(std::slice::from_ref)
             .chain((removed.len() > 1).then_some(removed.as_slice()))
         {
-            let mut remaining: Vec<usize> =
-                set.members.iter().copied().filter(|member| !removed.contains(member)).collect();
-            remaining.sort_unstable();
             if reduced_sets.len() < MAX_REVISED_SETS {
-                reduced_sets.insert(remaining);
+                reduced_sets.insert(sorted(&set.without(|member| removed.contains(&member))));
             }
         }
     }

@@ -20,12 +20,8 @@ const LEVELS_PER_ORDER: usize = 4;
 impl Columns<'_, '_> {
     /// Adds the hypothesis that the coordinate `site` has a free error in every pose.
     pub(super) fn add_per_pose(&mut self, site: ParameterSite, at: &DVector<f64>) {
-        let hypothesis = Hypothesis {
-            kind: HypothesisKind::PerPose,
-            site: Site::of(site),
-            coordinate: Some(site),
-            depends_on: Vec::new(),
-        };
+        let hypothesis =
+            Hypothesis::new(HypothesisKind::PerPose, Site::of(site), Some(site), Vec::new());
         self.add_design("per pose", 1.0, hypothesis, || Design::per_pose(at));
     }
 
@@ -58,8 +54,7 @@ impl Columns<'_, '_> {
             };
             let (kind, depends_on) =
                 (HypothesisKind::NearHarmonic(order), vec![command.covariate.clone()]);
-            let hypothesis =
-                Hypothesis { kind, site: Site::Joint(joint), coordinate: Some(site), depends_on };
+            let hypothesis = Hypothesis::new(kind, Site::Joint(joint), Some(site), depends_on);
             self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || {
                 expand(&[at], &waves())
             });
@@ -96,12 +91,12 @@ impl Columns<'_, '_> {
             if (1..=highest).filter(|order| !is_declared(order)).count() < MIN_GEAR_ORDERS {
                 continue;
             }
-            let hypothesis = Hypothesis {
-                kind: HypothesisKind::Gear(highest),
-                site: Site::Joint(joint),
-                coordinate: Some(site),
-                depends_on: vec![command.covariate.clone()],
-            };
+            let hypothesis = Hypothesis::new(
+                HypothesisKind::Gear(highest),
+                Site::Joint(joint),
+                Some(site),
+                vec![command.covariate.clone()],
+            );
             self.add("gear", 1.0, hypothesis, || {
                 let waves =
                     DMatrix::from_fn(command.values.len(), 2 * highest as usize, |row, k| {

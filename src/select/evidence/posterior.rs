@@ -1,8 +1,7 @@
 //! Probabilities of all sets of hypotheses, and the claims that follow.
 
 use super::families::OtherHypotheses;
-use super::hypothesis::{Hypothesis, HypothesisKind, Site};
-use super::hypothesis_set::HypothesisSet;
+use super::hypothesis::{Hypothesis, HypothesisKind, HypothesisSet, Site};
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 
@@ -280,11 +279,13 @@ mod tests {
         let of = |effects: &[Effect], probability: f64| HypothesisSet {
             hypotheses: effects
                 .iter()
-                .map(|effect| Hypothesis {
-                    kind: HypothesisKind::Effect(effect.clone()),
-                    site: Site::Measurement,
-                    coordinate: None,
-                    depends_on: vec![Covariate::Time],
+                .map(|effect| {
+                    Hypothesis::new(
+                        HypothesisKind::Effect(effect.clone()),
+                        Site::Measurement,
+                        None,
+                        vec![Covariate::Time],
+                    )
                 })
                 .collect(),
             probability,
@@ -312,11 +313,13 @@ mod tests {
 
     #[test]
     fn a_wave_is_as_sure_as_it_is_and_not_as_another_beside_it() {
-        let wave = |order: f64| Hypothesis {
-            kind: HypothesisKind::Effect(Effect::JointWave { joint: 1, order }),
-            site: Site::Joint(0),
-            coordinate: None,
-            depends_on: vec![Covariate::Command(0)],
+        let wave = |order: f64| {
+            Hypothesis::new(
+                HypothesisKind::Effect(Effect::JointWave { joint: 1, order }),
+                Site::Joint(0),
+                None,
+                vec![Covariate::Command(0)],
+            )
         };
         let of = |orders: &[f64], probability: f64| HypothesisSet {
             hypotheses: orders.iter().copied().map(wave).collect(),

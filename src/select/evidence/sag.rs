@@ -23,7 +23,7 @@ use crate::residual_tests::Covariate;
 const MIN_NEW_SIZE: f64 = 1e-3;
 
 /// Returns true if gravity acts on an arm without declared masses.
-pub(super) fn is_weight_unknown(problem: &Problem) -> bool {
+fn is_weight_unknown(problem: &Problem) -> bool {
     let has_mass =
         problem.joints.iter().any(|joint| !joint.bodies.is_empty() || joint.beam.is_some());
     problem.gravity.norm() > 0.0 && !has_mass
@@ -44,22 +44,14 @@ impl Columns<'_, '_> {
             let Some(lever) = self.linearised.column_at(site) else { continue };
             let Some(columns) = self.sag_columns(joint, &lever) else { continue };
             let site = Site::Joint(joint);
-            let hypothesis = Hypothesis {
-                kind: HypothesisKind::Sag,
-                site,
-                coordinate: None,
-                depends_on: vec![Covariate::Load],
-            };
+            let hypothesis =
+                Hypothesis::new(HypothesisKind::Sag, site, None, vec![Covariate::Load]);
             self.add("sag", 1.0, hypothesis, || columns.clone());
             columns_of_joints.push(columns);
         }
         if columns_of_joints.len() > 1 {
-            let hypothesis = Hypothesis {
-                kind: HypothesisKind::Sag,
-                site: Site::Arm,
-                coordinate: None,
-                depends_on: vec![Covariate::Load],
-            };
+            let hypothesis =
+                Hypothesis::new(HypothesisKind::Sag, Site::Arm, None, vec![Covariate::Load]);
             let columns: Vec<_> = columns_of_joints.iter().flat_map(DMatrix::column_iter).collect();
             self.add("sag", columns_of_joints.len() as f64, hypothesis, || {
                 DMatrix::from_columns(&columns)

@@ -1,6 +1,7 @@
 //! Sets of hypotheses by their probability: a beam search over sets of blocks of columns.
 
 use crate::select::settings::{BEAM_WIDTH, LOG_ODDS_CUTOFF, MAX_EFFECTS, MAX_EXTENDING};
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
@@ -35,6 +36,13 @@ pub(super) struct EvaluatedSet {
     pub probability: f64,
 }
 
+impl EvaluatedSet {
+    /// Returns the members for which `is_removed` is false, in the order in which they were added.
+    pub fn without(&self, is_removed: impl Fn(usize) -> bool) -> Vec<usize> {
+        self.members.iter().copied().filter(|&member| !is_removed(member)).collect()
+    }
+}
+
 /// Set with the sizes of its members and ln of its posterior, up to a constant.
 #[derive(Debug, Clone)]
 struct Set {
@@ -45,6 +53,11 @@ struct Set {
 }
 
 impl Set {
+    /// Returns the members in ascending order, which identify the set.
+    fn key(&self) -> Vec<usize> {
+        sorted(&self.members)
+    }
+
     /// Returns the set with one more hypothesis, given its gain and most probable size.
     fn with(&self, block: usize, (gain, size): (f64, f64), products: &Products) -> Self {
         Self {
@@ -107,7 +120,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         .chain([present.to_vec()]);
     for start in starts {
         if let Some(set) = assembled(&start, products) {
-            evaluated.insert(sorted(&set.members), set);
+            evaluated.insert(set.key(), set);
         }
     }
     // A set with more members than the search allows is evaluated as it is, and with one more
@@ -128,7 +141,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         for (place, set) in front.iter().enumerate() {
             let tried = promising.as_ref().filter(|_| place > 0).unwrap_or(&every);
             for longer in extended(set, tried, products) {
-                let key = sorted(&longer.members);
+                let key = longer.key();
                 let best = next.get(&key).or_else(|| evaluated.get(&key));
                 if best.is_none_or(|other| longer.exceeds(other)) {
                     next.insert(key, longer);
@@ -142,7 +155,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         let best_known = can_grow.map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
         let mut sets: Vec<Set> = next.values().cloned().collect();
         evaluated.extend(next);
-        sets.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        sets.sort_by(best_first);
         promising.get_or_insert_with(|| {
             let mut promising: Vec<usize> = Vec::new();
             for last in sets.iter().filter_map(|set| set.members.last()) {
@@ -152,14 +165,11 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
             }
             promising
         });
-        let best = sets
-            .into_iter()
-            .filter(|set| !set.has_wide(blocks))
-            .take(BEAM_WIDTH)
-            .collect::<Vec<_>>();
-        front = best.into_par_iter().map(|set| set.settled(products)).collect();
-        front.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-        evaluated.extend(front.iter().map(|set| (sorted(&set.members), set.clone())));
+        sets.retain(|set| !set.has_wide(blocks));
+        sets.truncate(BEAM_WIDTH);
+        front = sets.into_par_iter().map(|set| set.settled(products)).collect();
+        front.sort_by(best_first);
+        evaluated.extend(front.iter().map(|set| (set.key(), set.clone())));
         if front.first().is_none_or(|best| best.ln_posterior < best_known - LOG_ODDS_CUTOFF) {
             break;
         }
@@ -167,10 +177,10 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
     add_replacements(&mut evaluated, products);
     add_periodic_errors(&mut evaluated, products);
     let mut likely: Vec<&Set> = evaluated.values().collect();
-    likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    likely.sort_by(|a, b| best_first(a, b));
     let likely: Vec<Set> = likely.into_iter().take(MAX_SETTLED_SETS).cloned().collect();
     let settled: Vec<Set> = likely.into_par_iter().map(|set| set.settled(products)).collect();
-    evaluated.extend(settled.into_iter().map(|set| (sorted(&set.members), set)));
+    evaluated.extend(settled.into_iter().map(|set| (set.key(), set)));
     let most = evaluated.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = evaluated.values().map(|set| (set.ln_posterior - most).exp()).sum();
     let with_probability = |Set { members, sizes, ln_posterior }| {
@@ -195,20 +205,25 @@ fn add_periodic_errors(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Pro
     let blocks = products.blocks;
     let gears: Vec<usize> =
         (0..blocks.len()).filter(|&block| blocks[block].is_periodic_of_many_orders).collect();
-    let by_posterior = |a: &Set, b: &Set| a.ln_posterior.total_cmp(&b.ln_posterior);
     let with_gear = evaluated.values().filter(|set| products.has_gear(&set.members));
-    let best = with_gear.max_by(|a, b| by_posterior(a, b)).cloned();
+    let best = with_gear.max_by(|a, b| best_first(b, a)).cloned();
     for start in evaluated.get(&Vec::new()).cloned().into_iter().chain(best) {
         let mut next = Some(start);
         while let Some(set) = next {
-            let longer = extended(&set, &gears, products).into_iter().max_by(by_posterior);
+            let longer =
+                extended(&set, &gears, products).into_iter().max_by(|a, b| best_first(b, a));
             // The sizes converge together; otherwise the errors of other joints would constrain
             // the first one too tightly.
             let longer = longer.map(|longer| longer.with_converged_sizes(products));
             next = longer.filter(|longer| longer.ln_posterior > set.ln_posterior);
-            evaluated.extend(next.clone().map(|longer| (sorted(&longer.members), longer)));
+            evaluated.extend(next.clone().map(|longer| (longer.key(), longer)));
         }
     }
+}
+
+/// Compares sets by their posteriors; the more probable one is the lesser.
+fn best_first(a: &Set, b: &Set) -> Ordering {
+    b.ln_posterior.total_cmp(&a.ln_posterior)
 }
 
 /// Returns, for each of the `tried` hypotheses, the set extended by it.
@@ -240,7 +255,7 @@ fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Produc
     for _ in 0..MAX_EXCHANGES {
         let mut likely: Vec<&Set> =
             evaluated.values().filter(|set| !set.has_wide(blocks)).collect();
-        likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        likely.sort_by(|a, b| best_first(a, b));
         let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
         likely.retain(|set| set.ln_posterior > best - LOG_ODDS_CUTOFF);
         let is_surface = |member: &usize| blocks[*member].is_surface;
@@ -276,7 +291,7 @@ fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Produc
             return;
         }
         for set in new.into_iter().flatten() {
-            let entry = evaluated.entry(sorted(&set.members)).or_insert_with(|| set.clone());
+            let entry = evaluated.entry(set.key()).or_insert_with(|| set.clone());
             if set.exceeds(entry) {
                 *entry = set;
             }
@@ -297,7 +312,7 @@ fn replaced(
         if products.residual_model.stop.is_requested() { None } else { assembled(rest, products) };
     let Some(remaining) = remaining else { return Vec::new() };
     let mut with_first = extended(&remaining, first, products);
-    with_first.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    with_first.sort_by(best_first);
     let second: BTreeSet<usize> =
         second.iter().copied().filter(|other| !removed.contains(other)).collect();
     let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
@@ -374,7 +389,7 @@ fn assembled(members: &[usize], products: &Products) -> Option<Set> {
     Some(set.settled(products))
 }
 
-fn sorted(members: &[usize]) -> Vec<usize> {
+pub(super) fn sorted(members: &[usize]) -> Vec<usize> {
     let mut members = members.to_vec();
     members.sort_unstable();
     members

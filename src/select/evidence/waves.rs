@@ -30,10 +30,10 @@ use super::functions::expand;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Products, ReducedProblem};
-use super::search::{EvaluatedSet, reduced_by};
+use super::search::{EvaluatedSet, reduced_by, sorted};
 use crate::model::effect::HIGHEST_ORDER;
 use crate::model::parameter::{ParameterSite, are_all_fixed, makes_rule_invalid};
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::is_periodic_of_many_orders_at;
@@ -89,7 +89,7 @@ pub(super) struct Waves<'w, 'h, 'a> {
     pub left_out: &'w [usize],
 }
 
-impl<'w, 'a> Waves<'w, '_, 'a> {
+impl Waves<'_, '_, '_> {
     /// Returns waves of any order, and harmonics of unlisted orders, that may replace functions in
     /// probable sets.
     pub fn promising(&self, evaluated_sets: &[EvaluatedSet]) -> Vec<Candidate> {
@@ -113,7 +113,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 continue;
             }
             let reduced_problems: Vec<ReducedProblem> =
-                rests.iter().filter_map(|rest| self.reduced_by_set(rest)).collect();
+                rests.iter().filter_map(|rest| reduced_by(rest, self.products)).collect();
             let [step, finer] = PHASE_STEPS.map(|phase| phase / (high - low));
             // Orders with less than one cycle over the range of the joint are not searched.
             let first = self.gains(
@@ -183,20 +183,15 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let (joint, order) = joint_and_order(effect)?;
             let others: Vec<usize> =
                 numbers.iter().copied().filter(|&other| other != number).collect();
-            Some((number, self.likelihood_width(joint, order, &self.reduced_by_set(&others)?).ln()))
+            let reduced = reduced_by(&others, self.products)?;
+            Some((number, self.likelihood_width(joint, order, &reduced).ln()))
         };
         numbers.iter().zip(effects).filter_map(ln_width).collect()
     }
 
-    /// Returns the problem that remains once the hypotheses `members` are fitted; `None` if a
-    /// Cholesky factorisation fails.
-    fn reduced_by_set(&self, members: &[usize]) -> Option<ReducedProblem<'w, 'a>> {
-        reduced_by(members, self.products)
-    }
-
     /// Returns true if a joint, counted from 0, is prismatic.
     fn is_prismatic(&self, joint: usize) -> bool {
-        self.fitted.problem.joints[joint].command_kind() == JointKind::Prismatic
+        self.fitted.problem.joints[joint].takes_length()
     }
 
     /// Returns the highest order that is searched at a joint: [cycles per revolution], for a
@@ -219,40 +214,22 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         evaluated_sets: &[EvaluatedSet],
     ) -> BTreeMap<usize, Vec<Vec<usize>>> {
         let mut sets_of_function: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
-        let of = |member: usize| {
-            function_of_command(
-                &self.hypotheses.candidates[member].hypothesis,
-                &self.fitted.problem,
-            )
+        let candidates = &self.hypotheses.candidates;
+        let of = |k: usize| function_of_command(&candidates[k].hypothesis, &self.fitted.problem);
+        let mut add = |joint: usize, rest: &[usize]| {
+            let (rest, sets) = (sorted(rest), sets_of_function.entry(joint).or_default());
+            if !sets.contains(&rest) && sets.len() < MAX_REVISED_SETS {
+                sets.push(rest);
+            }
         };
-        let sliding: Vec<usize> = (0..self.fitted.problem.joints.len())
-            .filter(|&joint| self.is_prismatic(joint))
-            .collect();
         for set in evaluated_sets.iter().filter(|set| set.probability > MIN_REVISED_PROBABILITY) {
-            let mut whole = set.members.clone();
-            whole.sort_unstable();
-            for &joint in &sliding {
-                let sets_of_joint = sets_of_function.entry(joint).or_default();
-                if !sets_of_joint.contains(&whole) && sets_of_joint.len() < MAX_REVISED_SETS {
-                    sets_of_joint.push(whole.clone());
-                }
+            for joint in (0..self.fitted.problem.joints.len()).filter(|&j| self.is_prismatic(j)) {
+                add(joint, &set.members);
             }
             for &member in &set.members {
                 let Some(joint) = of(member) else { continue };
-                let without = |is_removed: &dyn Fn(usize) -> bool| -> Vec<usize> {
-                    let mut remaining: Vec<usize> =
-                        set.members.iter().copied().filter(|&other| !is_removed(other)).collect();
-                    remaining.sort_unstable();
-                    remaining
-                };
-                let sets_of_joint = sets_of_function.entry(joint).or_default();
-                for rest in
-                    [without(&|other| other == member), without(&|other| of(other) == Some(joint))]
-                {
-                    if !sets_of_joint.contains(&rest) && sets_of_joint.len() < MAX_REVISED_SETS {
-                        sets_of_joint.push(rest);
-                    }
-                }
+                add(joint, &set.without(|other| other == member));
+                add(joint, &set.without(|other| of(other) == Some(joint)));
             }
         }
         sets_of_function
@@ -272,11 +249,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 return Vec::new();
             }
             let wave = |&order: &f64| {
-                Some((
-                    order,
-                    self.hypotheses
-                        .wave_candidate(&Effect::JointWave { joint: joint + 1, order }, problem)?,
-                ))
+                let effect = Effect::JointWave { joint: joint + 1, order };
+                Some((order, self.hypotheses.wave_candidate(&effect, problem)?))
             };
             let (orders, waves): (Vec<f64>, Vec<Candidate>) =
                 orders.iter().filter_map(wave).unzip();

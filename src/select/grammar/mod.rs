@@ -17,16 +17,15 @@ mod beam;
 mod classes;
 mod dictionary;
 mod factor;
-mod prior;
 mod quantities;
 mod refinement;
 mod site;
 mod terms;
 mod written;
 
+pub(super) use classes::ln_prior;
 pub(super) use classes::{Proposal, proposals};
 pub(super) use factor::FormulaSite;
-pub(super) use prior::ln_prior;
 pub(super) use quantities::Quantities;
 pub(super) use site::{Noise, WhitenedSite};
 pub(super) use written::Written;

@@ -44,8 +44,7 @@ impl Quantities {
             varying(regressor.values(poses.iter().map(|pose| &pose.setup)))
         };
         let joints = || 0..problem.joints.len();
-        let takes_command =
-            |joint: &usize| problem.joints[*joint].command_kind() != JointKind::Fixed;
+        let takes_command = |joint: &usize| problem.joints[*joint].takes_command();
         let turns: Vec<bool> =
             problem.joints.iter().map(|joint| joint.kind == JointKind::Revolute).collect();
         let of_joints = |name: &str, is_of: &dyn Fn(&usize) -> bool| {

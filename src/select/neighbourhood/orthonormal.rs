@@ -106,7 +106,7 @@ fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usiz
 /// Returns a basis Z of the directions that the active constraints leave free: A D⁻¹ Z = 0 and ZᵀZ
 /// = I, for constraint rows A = `active`, shape = (constraints, n), and the scale D of the
 /// unknowns. `None` if there are no constraints.
-pub(super) fn free_directions(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>> {
+fn free_directions(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>> {
     let mut rows =
         DMatrix::from_fn(active.nrows(), active.ncols(), |i, j| active[(i, j)] / scale[j]);
     if rows.iter().all(|coefficient| *coefficient == 0.0) {

@@ -2,11 +2,11 @@
 //! the result.
 
 use std::cell::OnceCell;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::found::{Found, found};
-use super::interval;
-use super::misread::with_misread_effect;
+use nalgebra::Vector3;
+
+use super::found::{Found, found, with_misread_effect};
 use super::search::search;
 use super::state::{Round, SearchState};
 use super::status::{Status, Verdict};
@@ -15,16 +15,17 @@ use crate::fit::{
     Errors, Finding, FindingCode, Identification, IdentifyError, Options, Progress, identify,
 };
 use crate::measurement::Dataset;
-use crate::numeric::Interval;
+use crate::numeric::{Interval, mean_interval};
 use crate::problem::{Effect, Problem};
 use crate::residual_tests::ResidualTests;
-use crate::select::data::Data;
+use crate::select::data::{Data, bits};
 use crate::select::evidence::{Evidence, evaluate};
 use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::{HarmonicPrior, is_periodic_of_many_orders};
 use crate::select::left_out_gain::LeftOutGain;
 use crate::select::rules::SelectionRules;
 use crate::select::screening::{Trace, check_fit, trace_fit};
+use crate::select::settings::{INTERVAL_LEVEL, RESAMPLES};
 use crate::select::unexplained::{self, Unexplained};
 
 /// Result of the loop, from the declared to the extended problem.
@@ -106,9 +107,9 @@ pub fn close_by(
 ) -> Result<ClosedLoop, IdentifyError> {
     rules.check()?;
     // A stop request ends only the search; the effects found so far are still fitted and tested.
-    let data = Data::new(problem, data, rules).with_candidates(&options.candidates);
+    let data = Data { candidates: &options.candidates, ..Data::new(problem, data, rules) };
     let (stoppable, unstoppable) = (
-        data.clone().with_stop(options.stop.clone().unwrap_or_default()),
+        Data { stop: options.stop.clone().unwrap_or_default(), ..data.clone() },
         options.clone().with_stop(None),
     );
     // Evidence is evaluated for positions only, so only positions are fitted.
@@ -181,7 +182,7 @@ pub fn close_by(
         [] => of.found.left_out.clone(),
         held_out => of.errors(&data, held_out),
     };
-    let gain = interval::gain(&data, &judged(&declared), &judged(&fitted));
+    let gain = mean_gain(&data, &judged(&declared), &judged(&fitted));
     let rows = data.evidence_rows();
     let supporting_alone =
         evidence.iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
@@ -346,10 +347,30 @@ fn fit_with_found(
     let sure: Vec<Effect> = sure.map(|found| found.effect.clone()).collect();
     let problem = state.problem(fitted, &sure);
     // Only the errors of this fit are reported, so a fit of many unknowns is not checked.
-    let options = if state.affordable_fits(fitted) > 1 {
+    let options = if state.affordable_fits(fitted.unknowns.len()) > 1 {
         fitted.options_from_estimates(options)
     } else {
         Options { provisional: true, ..fitted.warm_started_options(options, true) }
     };
     fitted.fit_other(problem, state.data, &options)
+}
+
+/// Returns the mean of |`before`| − |`after`|, the errors of the held-out rows of the leading kind
+/// \[m\] or \[rad\], with a bootstrap interval over configurations. If no row is held out, the
+/// errors are those of all identification rows.
+fn mean_gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
+    let kind = data.measurements.leading().kind();
+    let held_out = &data.split.held_out;
+    let rows = if held_out.is_empty() { data.rows() } else { held_out };
+    let mut groups: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
+    for ((&row, before), after) in rows.iter().zip(before).zip(after) {
+        if data.measurements.observation(row).kind() != kind {
+            continue;
+        }
+        let gain = before.norm() - after.norm();
+        groups.entry(bits(data.measurements.configuration(row))).or_default().push(gain);
+    }
+    let sums: Vec<(f64, f64)> =
+        groups.values().map(|gains| (gains.iter().sum::<f64>(), gains.len() as f64)).collect();
+    mean_interval(&sums, RESAMPLES, INTERVAL_LEVEL, data.rules.seed)
 }

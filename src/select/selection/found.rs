@@ -1,24 +1,25 @@
 //! Claims, tests and alternatives for each effect that the search added.
 
-use crate::select::settings::{MIN_ALTERNATIVE_ODDS, MIN_SHARE_OF_SUBSETS};
 use std::collections::BTreeMap;
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use super::misread;
-use super::plainer::{Plainer, compare_with_plainer};
-use super::ranges::ranges;
 use super::state::{Round, SearchState};
 use super::status::Status;
-use crate::fit::{ErrorSummary, Estimate};
-use crate::problem::Effect;
+use crate::fit::{ErrorSummary, Estimate, IdentifyError, MisreadEffect, Options};
+use crate::problem::{Effect, PoseView, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::candidates::Candidates;
-use crate::select::evidence::{Claims, Evidence, HypothesisSet, SubsetEvidence, subset_evidence};
+use crate::select::data::Data;
+use crate::select::evidence::{
+    Claims, Evidence, Hypothesis, HypothesisSet, SubsetEvidence, subset_evidence,
+};
 use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::is_periodic_of_many_orders;
+use crate::select::left_out_gain::LeftOutGain;
 use crate::select::neighbourhood::tries;
 use crate::select::reference_check::{ReferenceCheck, reference_check};
+use crate::select::settings::{MIN_ALTERNATIVE_ODDS, MIN_SHARE_OF_SUBSETS};
 
 /// Smallest number of orders of one harmonic at which only the claim is made that some of the
 /// orders act, not all.
@@ -154,7 +155,7 @@ pub(super) fn found(
         let alternatives = with_rivals(alternatives, instead);
         let misread = state.misread.as_ref().filter(|misread| misread.effect == effect);
         let claims = match misread {
-            Some(misread) => Some(misread::claims(misread, &fitted.problem)),
+            Some(misread) => Some(misread_claims(misread, &fitted.problem)),
             None => claims,
         };
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear_probability);
@@ -308,4 +309,139 @@ fn alternatives(
         });
     }
     found
+}
+
+/// Effect of a fit, and plainer effects that may act in its place.
+#[derive(Debug, Clone)]
+struct Plainer {
+    /// Effect of the fit.
+    pub effect: Effect,
+    /// Effects that may act together in its place.
+    pub instead: Vec<Effect>,
+    /// Probability of the effect if either the effect or all of `instead` act; both have the same
+    /// prior probability.
+    pub share: f64,
+}
+
+/// Returns the plainer causes that together displace the target almost as an effect does: bending
+/// of a link rotates and shifts its end, as compliance of the joints at both ends does.
+fn plainer_causes(effect: &Effect) -> Vec<Effect> {
+    match *effect {
+        Effect::LinkBending { joint } if joint > 1 => {
+            [joint - 1, joint].map(|joint| Effect::JointCompliance { joint }).into()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Fits the plainer causes of each added effect in its place, and compares the predictions of
+/// left-out poses. Effects without plainer causes are left out.
+fn compare_with_plainer(state: &SearchState, fitted: &Fitted) -> Vec<Plainer> {
+    let added = state.added(fitted);
+    let compared = |effect: &Effect| {
+        let others: Vec<Effect> = added.iter().filter(|other| *other != effect).cloned().collect();
+        let without = state.problem(fitted, &others);
+        let candidates = Candidates::new(&without, state.data);
+        let is_tested = |cause: &Effect| candidates.testable.contains(cause);
+        let instead: Vec<Effect> = plainer_causes(effect).into_iter().filter(is_tested).collect();
+        if instead.is_empty() {
+            return None;
+        }
+        let effects = [others.as_slice(), instead.as_slice()].concat();
+        let rival = state.fit(fitted, &effects).ok()?;
+        // The σ of the noise is that of the better fit.
+        let sigma = fitted.sigma.min(rival.sigma);
+        let gain = LeftOutGain::new(fitted, &rival, state.data)?;
+        let share = (1.0 + (-gain.ln_odds(sigma)).exp()).recip();
+        Some(Plainer { effect: effect.clone(), instead, share })
+    };
+    added.iter().filter_map(compared).collect()
+}
+
+/// Fits the declared problem with the effect that expresses the misreading of its table, starting
+/// at the size that the checks found. Returns `None` if there is no such effect, or if it does not
+/// predict left-out poses significantly better.
+///
+/// A search in the linear neighbourhood of a fit that is far off would not find such an effect.
+///
+/// # Errors
+/// Returns an error if the fit fails or was stopped.
+pub(super) fn with_misread_effect(
+    state: &mut SearchState,
+    declared: &Fitted,
+) -> Result<Option<Fitted>, IdentifyError> {
+    let Some(misread) = declared.found.misread.clone() else { return Ok(None) };
+    let MisreadEffect { effect, size, .. } = misread.clone();
+    let candidates = Candidates::new(&declared.problem, state.data);
+    if !candidates.testable.contains(&effect) {
+        return Ok(None);
+    }
+    let names = misread.parameters(&declared.problem).into_iter();
+    let start = names.map(|name| (name, size)).collect();
+    let options = Options { start, influential_rows: false, ..state.options.clone() };
+    state.misread = Some(misread);
+    let problem = state.problem(declared, &[effect]);
+    let fitted = match declared.fit_other(problem, state.data, &options) {
+        Ok(fitted) => fitted,
+        Err(error) if error.is_interrupted() => return Err(error),
+        Err(_) => {
+            state.misread = None;
+            return Ok(None);
+        }
+    };
+    let gain = LeftOutGain::new(&fitted, declared, state.data);
+    if !gain.is_some_and(|gain| gain.is_significant()) {
+        state.misread = None;
+        return Ok(None);
+    }
+    state.register_new(&fitted);
+    state.record(&fitted);
+    Ok(Some(fitted))
+}
+
+/// Returns the claims about the effect: place, quantities and law have the probability of this
+/// misreading among all possible ones.
+fn misread_claims(misread: &MisreadEffect, problem: &Problem) -> Claims {
+    let law = Hypothesis::of_effect(&misread.effect, problem, (false, false));
+    let p = misread.probability;
+    Claims { place: (law.site, p), depends_on: (law.depends_on.clone(), p), law: (law, p) }
+}
+
+/// Returns the recorded quantities on which an effect depends, with their ranges over the
+/// identification poses (SI, temperatures in °C).
+pub(super) fn ranges(
+    fitted: &Fitted,
+    data: &Data,
+    effect: &Effect,
+) -> Vec<(Covariate, (f64, f64))> {
+    let poses = fitted.poses(data, data.rows());
+    let has_approach = poses.iter().any(|pose| pose.setup.approach.is_some());
+    let coverage = (has_approach, data.measurements.time_measured);
+    let names = fitted.problem.covariate_names();
+    let range = |covariate: Covariate| {
+        let values = poses.iter().map(|pose| value(&covariate, &pose.setup, &names));
+        let values = values.collect::<Option<Vec<f64>>>()?;
+        let extreme = |of: fn(f64, f64) -> f64| values.iter().copied().reduce(of);
+        Some((covariate, (extreme(f64::min)?, extreme(f64::max)?)))
+    };
+    let depends_on = Hypothesis::of_effect(effect, &fitted.problem, coverage).depends_on;
+    depends_on.into_iter().filter_map(range).collect()
+}
+
+/// Returns the value of a covariate in a pose; `None` if the table does not record it. `names` are
+/// those of the declared covariates.
+fn value(covariate: &Covariate, setup: &PoseView, names: &[String]) -> Option<f64> {
+    match covariate {
+        Covariate::Command(joint) => setup.configuration.get(*joint).copied(),
+        Covariate::Temperature => setup.temperature.copied(),
+        Covariate::Payload => setup.payload.copied(),
+        Covariate::Hoist => setup.hoist.copied(),
+        Covariate::Time | Covariate::Row => Some(setup.elapsed),
+        Covariate::Approach(joint) => setup.approach.map(|sides| sides[*joint]),
+        Covariate::Load | Covariate::Position => None,
+        Covariate::Declared(name) => {
+            let index = names.iter().position(|other| other.as_str() == &**name)?;
+            setup.covariates.get(index).copied()
+        }
+    }
 }

@@ -14,11 +14,6 @@
 mod close;
 mod found;
 mod gears;
-mod interval;
-mod misread;
-mod plainer;
-mod polish;
-mod ranges;
 mod search;
 mod state;
 mod status;

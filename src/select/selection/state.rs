@@ -129,13 +129,9 @@ impl<'a> SearchState<'a> {
         Ok(evidence)
     }
 
-    /// Returns the number of fits, with as many unknowns as `fitted`, that the budget `fit_work`
-    /// allows; at least one.
-    pub fn affordable_fits(&self, fitted: &Fitted) -> usize {
-        self.paid_fits_of(fitted.unknowns.len())
-    }
-
-    fn paid_fits_of(&self, unknowns: usize) -> usize {
+    /// Returns the number of fits with this many unknowns that the budget `fit_work` allows; at
+    /// least one.
+    pub fn affordable_fits(&self, unknowns: usize) -> usize {
         let work = self.data.rows().len() as f64 * (unknowns as f64).powi(2);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
         let count = (self.data.rules.fit_work / work.max(1.0)) as usize;
@@ -176,7 +172,7 @@ impl<'a> SearchState<'a> {
             effects.iter().map(|effect| effect.parameters(&problem).len()).sum()
         };
         let more = parameters(added).saturating_sub(parameters(&self.added(from)));
-        let paid = self.paid_fits_of(from.unknowns.len() + more);
+        let paid = self.affordable_fits(from.unknowns.len() + more);
         let steps = STEPS_PER_PAID_FIT * paid as u64;
         let max_steps = Some(self.options.max_steps.map_or(steps, |most| most.min(steps)));
         let provisional = paid == 1;
