@@ -5,7 +5,6 @@ use std::f64::consts::TAU;
 use super::Measurements;
 use super::limits::Commands;
 use crate::error::{Location, Warning, WarningKind};
-use crate::numeric::range;
 use crate::problem::{Observation, Problem};
 
 /// Range of room temperatures, 15 °C to 35 °C, in degrees Fahrenheit.
@@ -87,7 +86,9 @@ impl Measurements {
     /// Returns a warning if the reference temperature is far beyond all temperatures.
     pub(super) fn far_reference(&self, problem: &Problem) -> Option<Warning> {
         let reference = problem.data.reference_temperature?;
-        let (least, most) = range(self.temperature.iter().flatten().copied());
+        let values = || self.temperature.iter().flatten().copied();
+        let (least, most) =
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
         let distance = (least - reference).max(reference - most);
         let is_far = distance > MIN_FAR_REFERENCE.max(most - least) && distance.is_finite();
         let kind = WarningKind::FarReference {
