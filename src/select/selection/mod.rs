@@ -8,6 +8,7 @@
 //! - `misread`: begins with the effect that expresses a misread table.
 //! - `plainer`: compares an effect with plainer causes that together do the same.
 //! - `close`: runs the loop from the declared problem to its result.
+//! - `remainder`: corrects what no sure law explains.
 //! - `found`, `status`, `interval`: the claims about each effect, the verdict, and the gain on
 //!   held-out poses.
 
@@ -19,6 +20,7 @@ mod misread;
 mod plainer;
 mod polish;
 mod ranges;
+mod remainder;
 mod search;
 mod state;
 mod status;
