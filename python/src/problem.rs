@@ -212,19 +212,16 @@ impl Problem {
             let text = Arc::clone(&self.text);
             move |sink| {
                 let options = Options::default().with_influential_rows().with_progress(sink);
-                let closure = select::close(&problem, &data, &options)?;
+                let (closure, fitted) =
+                    select::close(&problem, &data, &options)?.corrected(&data)?;
                 // The extended problem may declare another arm than was fitted, as without an
                 // effect that data contradict.
                 let text = closed_text(&text, &problem, &closure).ok();
                 let file = &problem.data.location.file;
-                let closed = text
+                let is_declared = text
                     .and_then(|text| flexcal::problem::Problem::parse(&text, file).ok())
-                    .filter(|closed| closed.digest() == closure.closed.digest());
-                let fitted = closed
-                    .map(|_| remainder::fit(&closure.after, &closure.closed, &data))
-                    .transpose()?
-                    .flatten();
-                Ok::<_, IdentifyError>((closure, fitted))
+                    .is_some_and(|closed| closed.digest() == closure.closed.digest());
+                Ok::<_, IdentifyError>((closure, fitted.filter(|_| is_declared)))
             }
         })?;
         let (closure, fitted) = closure.map_err(|error| raised(&error))?;

@@ -4,13 +4,12 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::fit::{FindingCode, Options, ProgressSink};
-use flexcal::measurement::Dataset;
+use flexcal::fit::{Options, ProgressSink};
 use flexcal::problem::{self, Problem};
-use flexcal::remainder::{self, Correction, Fitted};
+use flexcal::remainder::Correction;
 use flexcal::report::{self, PredictionAccuracy};
 use flexcal::results::{Document as _, LoopResult, PlotData, REMAINDER_FILE, residuals_csv};
-use flexcal::select::{self, ClosedLoop};
+use flexcal::select;
 
 use super::input::Common;
 use super::loop_record::LoopRecord;
@@ -62,9 +61,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let closure = Line::during(common.prints_text(), stop, close)?;
     let results = if closure.interrupted { record.beside_finished()? } else { results };
     let [files, joint_files] = record.files_relative_to(&results.folder)?;
+    let (closure, fitted) = closure.corrected(&data)?;
     let mut shown = PlotData::of_loop(&problem, &data, &closure)?;
     let closed = report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?;
-    let fitted = fit_remainder(&problem, &closed, &closure, &data)?;
+    // The text declares another arm than was fitted if data contradict an effect.
+    let is_declared =
+        Problem::parse(&closed, &problem.data.location.file)?.digest() == closure.closed.digest();
+    let fitted = fitted.filter(|_| is_declared);
     if let Some(fitted) = &fitted {
         shown = shown.with_uncertainty((&closure.after, &closure.closed), &data, fitted)?;
     }
@@ -108,24 +111,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         format!("{told}{words}{}Next: {next}\n", results.written())
     })?;
     Ok(if closure.interrupted { Outcome::NotMet } else { outcome })
-}
-
-/// Fits a remainder in addition to the effects of the extended problem, whose text is `closed`.
-/// Returns `None` if the loop was interrupted, if the table was misread, or if the text declares
-/// another arm than was fitted. The latter happens if an effect was removed because data contradict
-/// it.
-fn fit_remainder(
-    problem: &Problem,
-    closed: &str,
-    closure: &ClosedLoop,
-    data: &Dataset,
-) -> Result<Option<Fitted>, Box<dyn Error>> {
-    let declared = Problem::parse(closed, &problem.data.location.file)?;
-    let is_misread = closure.after.has(FindingCode::Misread);
-    if declared.digest() != closure.closed.digest() || closure.interrupted || is_misread {
-        return Ok(None);
-    }
-    Ok(remainder::fit(&closure.after, &closure.closed, data)?)
 }
 
 /// Error of a data file that `problem.closed.toml` cannot name.

@@ -1,10 +1,10 @@
 //! Fits a remainder together with the parameters of an identification, and decides whether to keep
 //! it.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::correction::Correction;
-use super::gain::Gain;
+use super::gain::{Gain, MeanDifference};
 use super::judge::judge;
 use super::linearise::{Linearisation, prior, timed_poses};
 use super::residuals::{CorrectedResiduals, residuals};
@@ -16,6 +16,8 @@ use crate::problem::{Observation, Problem};
 
 /// Minimum number of configurations for which the uncertainty of predictions is estimated.
 pub(crate) const MIN_CONFIGURATIONS: usize = 10;
+/// Probability with which one of two remainders seems to predict better although it does not.
+const FALSE_CHOICE_PROBABILITY: f64 = 0.025;
 /// Maximum number of rows to which a correction is fitted.
 const MAX_ROWS: usize = 10_000;
 
@@ -39,6 +41,20 @@ pub struct Fitted {
     /// if they were not.
     #[doc(hidden)]
     pub carried: Option<Carried>,
+    /// Errors of left-out rows with the remainder, whether it is kept or not; empty if none was
+    /// fitted.
+    pub(super) left_out: Vec<LeftOutRow>,
+}
+
+/// Row that was predicted without its configuration.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LeftOutRow {
+    /// Index of the row in its table.
+    row: usize,
+    /// Index of the configuration of the row.
+    configuration: usize,
+    /// Error length \[m\].
+    length: f64,
 }
 
 /// How the corrections of an earlier estimate were carried over to a new one.
@@ -82,6 +98,13 @@ impl Fitted {
             joints: self.remainder.as_ref().map_or(0, |remainder| remainder.joints().len()),
             held_out: residuals.map(|corrected| corrected.errors.held_out),
         }
+    }
+
+    /// Returns true if this remainder, with the effects that it was fitted with, predicts left-out
+    /// configurations better than `other` does with other effects: by more than chance, in a
+    /// one-sided t test at 2.5 %.
+    pub(crate) fn is_better_than(&self, other: &Self) -> bool {
+        are_shorter(&self.left_out, &other.left_out)
     }
 
     /// Returns the correction of predictions: with the remainder if one is kept, else one that only
@@ -147,6 +170,14 @@ fn fitted(
     let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let Some(training) = training_rows(found, problem, &model, data) else { return Ok(None) };
     let Some(judged) = judge(&training, is_remainder_wanted) else { return Ok(None) };
+    let positions = fitted_rows(found, data).positions;
+    let left_out = training.judged.iter().zip(&judged.left_out_lengths);
+    let left_out = left_out.map(|(&row, &length)| LeftOutRow {
+        row: positions[row],
+        configuration: training.rows.configuration[row],
+        length,
+    });
+    let left_out = left_out.collect();
     let correction = |conditioned| Correction::new((found, problem), &training, conditioned);
     let alone = correction(judged.alone);
     let remainder = judged.remainder.map(correction);
@@ -159,6 +190,7 @@ fn fitted(
         residuals,
         is_declared: false,
         carried: None,
+        left_out,
     }))
 }
 
@@ -232,4 +264,42 @@ pub(super) fn fitted_rows(found: &Identification, data: &Dataset) -> FittedRows 
     let step = fitted.positions.len().div_ceil(MAX_ROWS).max(1);
     fitted.positions = fitted.positions.into_iter().step_by(step).collect();
     fitted
+}
+
+/// Returns true if left-out rows have shorter errors than the same rows of `others`, by more than
+/// chance. Rows of one configuration count once.
+fn are_shorter(errors: &[LeftOutRow], others: &[LeftOutRow]) -> bool {
+    let lengths: HashMap<usize, f64> = others.iter().map(|of| (of.row, of.length)).collect();
+    let mut gains: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for of in errors {
+        if let Some(length) = lengths.get(&of.row) {
+            gains.entry(of.configuration).or_default().push(length - of.length);
+        }
+    }
+    let mean = |gains: &Vec<f64>| gains.iter().sum::<f64>() / gains.len() as f64;
+    let gains: Vec<f64> = gains.values().map(mean).collect();
+    MeanDifference::of(&gains).exceeds(FALSE_CHOICE_PROBABILITY, gains.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_remainder_is_better_only_if_most_configurations_gain() {
+        let rows = |lengths: &[f64]| -> Vec<LeftOutRow> {
+            let of = |(row, &length)| LeftOutRow { row, configuration: row / 2, length };
+            lengths.iter().enumerate().map(of).collect()
+        };
+        let long = rows(&[1.0; 24]);
+        let gains = |k: usize| if k % 4 < 2 { 0.3 } else { 0.5 };
+        let short = rows(&(0..24).map(|k| 1.0 - gains(k)).collect::<Vec<f64>>());
+        assert!(are_shorter(&short, &long) && !are_shorter(&long, &short));
+        // One configuration of twelve, measured twice, proves nothing.
+        let mut once = vec![1.0; 24];
+        (once[6], once[7]) = (0.0, 0.0);
+        assert!(!are_shorter(&rows(&once), &long));
+        // Rows that only one of both judged are left out.
+        assert!(!are_shorter(&short, &long[..2]));
+    }
 }

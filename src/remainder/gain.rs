@@ -27,11 +27,17 @@ pub struct MeanDifference {
 }
 
 impl MeanDifference {
-    fn of(differences: &[f64]) -> Self {
+    pub(super) fn of(differences: &[f64]) -> Self {
         let n = differences.len() as f64;
         let mean = differences.iter().sum::<f64>() / n;
         let squares = differences.iter().map(|difference| (difference - mean).powi(2));
         Self { mean, std_error: (squares.sum::<f64>() / (n - 1.0) / n).sqrt() }
+    }
+
+    /// Returns true if the mean of `count` differences is larger than chance: one-sided t test at
+    /// the level `chance`.
+    pub(super) fn exceeds(&self, chance: f64, count: usize) -> bool {
+        self.ratio() > quantile(1.0 - chance, count)
     }
 
     /// Returns the mean divided by its standard error.
@@ -101,20 +107,13 @@ impl Gain {
     /// Returns the ratio of the mean decrease of the error length to its standard error that noise
     /// alone exceeds with a probability of 2 %. It is a quantile of Student's t distribution.
     pub fn threshold(&self) -> f64 {
-        self.quantile(1.0 - FALSE_GAIN_PROBABILITY)
+        quantile(1.0 - FALSE_GAIN_PROBABILITY, self.configurations)
     }
 
     /// Returns the ratio of the mean increase of the log density to its standard error that noise
     /// alone exceeds with a probability of 10 %.
     pub fn density_threshold(&self) -> f64 {
-        self.quantile(1.0 - FALSE_DENSITY_GAIN_PROBABILITY)
-    }
-
-    /// Returns the quantile `level` of Student's t distribution with one degree of freedom less
-    /// than there are configurations.
-    fn quantile(&self, level: f64) -> f64 {
-        StudentsT::new(0.0, 1.0, self.configurations as f64 - 1.0)
-            .map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(level))
+        quantile(1.0 - FALSE_DENSITY_GAIN_PROBABILITY, self.configurations)
     }
 
     /// Returns the smallest increase of the log evidence at which a remainder is kept. Noise alone
@@ -134,4 +133,11 @@ impl Gain {
             && self.density.ratio() > self.density_threshold()
             && self.ln_evidence > Self::least_evidence()
     }
+}
+
+/// Returns the quantile `level` of Student's t distribution with one degree of freedom less than
+/// there are configurations.
+fn quantile(level: f64, configurations: usize) -> f64 {
+    StudentsT::new(0.0, 1.0, configurations as f64 - 1.0)
+        .map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(level))
 }

@@ -33,6 +33,9 @@ pub(super) struct Judged {
     pub remainder: Option<Conditioned>,
     /// Gain in accuracy by the remainder, whether it is kept or not; `None` if none was fitted.
     pub gain: Option<Gain>,
+    /// Error length of each judged row with the remainder, predicted without its configuration
+    /// \[m\]; empty if none was fitted.
+    pub left_out_lengths: Vec<f64>,
 }
 
 /// Conditions on the training rows with the parameters alone and, if wanted, with a remainder.
@@ -65,7 +68,8 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
     let (single_alone, blocks_alone) = left_out(&alone)?;
     let errors_alone = errors(&noise, &single_alone, &single_alone);
     let plain = with_scores(alone, &errors_alone, &errors(&noise, &blocks_alone, &blocks_alone));
-    let without = Judged { alone: plain, remainder: None, gain: None };
+    let without =
+        Judged { alone: plain, remainder: None, gain: None, left_out_lengths: Vec::new() };
     let is_fitted = is_remainder_wanted
         && !training.layout.sites.is_empty()
         && training.configurations.len() >= MIN_CONFIGURATIONS_FOR_REMAINDER;
@@ -87,7 +91,8 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
         conditioned.scores.multiply(inflation);
         conditioned
     });
-    Some(Judged { remainder, gain: Some(gain), ..without })
+    let left_out_lengths = single.iter().map(|error| error.length).collect();
+    Some(Judged { remainder, gain: Some(gain), left_out_lengths, ..without })
 }
 
 /// Returns the factor by which error bounds grow because hyperparameters were fitted to the same

@@ -155,6 +155,7 @@ impl EarlierCorrections {
             residuals: residuals.transpose()?,
             is_declared: false,
             carried: Some(Carried { widening, positions: rows.len(), conditioning }),
+            left_out: Vec::new(),
         }))
     }
 }

@@ -122,8 +122,11 @@ pub(super) fn structure_sentences(
             sentences.push(words);
         }
     }
-    // If all structure is due to wrong limits, the sentences about laws do not apply.
-    if result.structures().all(|left| left.limit.is_some()) {
+    // If all structure is due to wrong limits, the sentences about laws do not apply. A remainder
+    // corrects structure with a law that is not sure.
+    let has_law =
+        |left: &Structure| left.claims.as_ref().is_some_and(|claims| claims.law.value.is_some());
+    if result.structures().all(|left| left.limit.is_some() || has_law(left)) {
         return sentences;
     }
     let mut catalogue =
@@ -210,6 +213,13 @@ fn structure_sentence(structure: &Structure) -> String {
         return format!("Undeclared weight deflects {what}: probability {law} ({chance}).");
     }
     let at = percent(claims.place.probability);
+    if claims.law.value.is_some() {
+        return format!(
+            "An error acts {} (probability {at}); its law is not sure. The most probable one tried has a probability of {law}: {}.",
+            at_place(place),
+            claims.description
+        );
+    }
     if inputs.is_empty() {
         return format!(
             "An error acts {} (probability {at}); its inputs and its law are not known ({chance}).",

@@ -160,8 +160,9 @@ pub struct Structure {
     #[serde(rename = "where")]
     pub place: String,
     pub depends_on: Vec<String>,
-    /// Kind of function, for example `smooth`, `sag`, `wandering` or `limit`; null if only the
-    /// residual tests detect the structure.
+    /// Kind of function, for example `smooth`, `sag`, `wandering` or `limit`; name of the most
+    /// probable effect if a remainder corrects the structure instead; null if only the residual
+    /// tests detect the structure.
     pub law: Option<String>,
     /// Limit of the declared problem (bound or prior) that is wrong or hides a cause; null for
     /// other structure.

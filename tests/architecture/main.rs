@@ -78,7 +78,8 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("life", &[GROUND, BELOW_FIT, &["fit", "remainder", "files"]]),
     // Statistical tests of a residual are independent of arms and fits.
     ("residual_tests", &[&["error", "laws", "problem", "model", "numeric"]]),
-    ("select", &[GROUND, BELOW_FIT, &["fit", "residual_tests"]]),
+    // The search for effects, which gives way to a remainder where no law is sure.
+    ("select", &[GROUND, BELOW_FIT, &["fit", "remainder", "residual_tests"]]),
     // Import and export of URDF.
     (
         "urdf",

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::found::{Found, found, with_misread_effect};
+use super::remainder::FoundAlone;
 use super::search::search;
 use super::state::{Round, SearchState};
 use super::status::{Status, Verdict};
@@ -65,6 +66,9 @@ pub struct ClosedLoop {
     pub set_aside: Vec<Location>,
     /// Settings with which the search ran.
     pub rules: SelectionRules,
+    /// Fit with the effects of status [`Status::Found`] alone, if there are others and a remainder
+    /// may replace these.
+    pub(super) found_alone: Option<Box<FoundAlone>>,
 }
 
 impl ClosedLoop {
@@ -177,12 +181,27 @@ pub fn close_by(
     let is_noise_with_found =
         is_noise && with_found.as_ref().is_none_or(|sure| !check_fit(sure, &data).is_structured());
     let verdict = Verdict::of(&statuses, is_noise, is_noise_with_found);
-    let with_found = with_found.map_or(fitted.found.fitted, |sure| sure.found.fitted);
     let judged = |of: &Fitted| match data.split.held_out.as_slice() {
         [] => of.found.left_out.clone(),
         held_out => of.errors(&data, held_out),
     };
-    let gain = mean_gain(&data, &judged(&declared), &judged(&fitted));
+    let gain_of = |of: &Fitted| mean_gain(&data, &judged(&declared), &judged(of));
+    let gain = gain_of(&fitted);
+    let replaceable = with_found.as_ref().filter(|sure| {
+        !sure.found.provisional
+            && sure.found.is_trusted()
+            && !problem.data.fits_orientation
+            && !statuses.contains(&Status::Contradicted)
+    });
+    let found_alone = replaceable.map(|sure| {
+        Box::new(FoundAlone {
+            residual_tests: check_fit(sure, &data),
+            gain: gain_of(sure),
+            found: sure.found.clone(),
+            problem: sure.problem.clone(),
+        })
+    });
+    let with_found = with_found.map_or(fitted.found.fitted, |sure| sure.found.fitted);
     let rows = data.evidence_rows();
     let supporting_alone =
         evidence.iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
@@ -216,6 +235,7 @@ pub fn close_by(
         gain,
         set_aside,
         rules: rules.clone(),
+        found_alone,
     })
 }
 

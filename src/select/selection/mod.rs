@@ -8,12 +8,14 @@
 //! - `misread`: begins with the effect that expresses a misread table.
 //! - `plainer`: compares an effect with plainer causes that together do the same.
 //! - `close`: runs the loop from the declared problem to its result.
+//! - `remainder`: corrects what no sure law explains.
 //! - `found`, `status`, `interval`: the claims about each effect, the verdict, and the gain on
 //!   held-out poses.
 
 mod close;
 mod found;
 mod gears;
+mod remainder;
 mod search;
 mod state;
 mod status;
