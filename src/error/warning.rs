@@ -12,7 +12,10 @@ use super::phrases::plural;
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum WarningKind {
-    #[error("unknown column{}; ignored{}", did_you_mean(meant.as_deref()), covariate_hint(meant.as_deref(), *is_angle))]
+    #[error(
+        "unknown column{}; ignored{}",
+        did_you_mean(meant.as_deref()), covariate_hint(meant.as_deref(), *is_angle)
+    )]
     ColumnIgnored { meant: Option<String>, is_angle: bool },
     #[error(
         "no column of {} has a name of [data.columns]; the table is read by flexcal's names",
@@ -52,8 +55,9 @@ pub enum WarningKind {
     )]
     OutsideImage { value: String, camera: String, image: [String; 2], rows: usize },
     #[error(
-        "pixels of the camera \"{camera}\" reach {}, {}, but its centre_px is that of images of {} × {} \
-         pixels: if its intrinsics were found at another resolution, multiply focal_px and centre_px by \
+        "pixels of the camera \"{camera}\" reach {}, {}, but its centre_px is that of images of \
+         {} × {} pixels: if its intrinsics were found at another resolution, multiply focal_px and \
+         centre_px by \
          the ratio of the resolutions",
         pixel[0], pixel[1], image[0], image[1]
     )]
@@ -345,8 +349,9 @@ fn covariate_hint(meant: Option<&str>, is_angle: bool) -> &'static str {
     match (meant, is_angle) {
         (Some(_), _) => "",
         (None, true) => {
-            " (if it is a joint of the arm, its [[joint]] is missing: from a URDF, flexcal init with \
-             another --tip adds it; if the arm may only depend on it, name it in [data.covariates])"
+            " (if it is a joint of the arm, its [[joint]] is missing: from a URDF, flexcal init \
+             with another --tip adds it; if the arm may only depend on it, name it in \
+             [data.covariates])"
         }
         (None, false) => " (name it in [data.covariates] if the arm may depend on it)",
     }

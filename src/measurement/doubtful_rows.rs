@@ -8,8 +8,8 @@ use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Joint, JointKind, Observation, Problem};
 
 /// Smallest ratio of the farthest pixel to twice the centre of the image, along both axes, at which
-/// the intrinsics of a camera are those of another resolution. Centres of lenses are nearer to those
-/// of images.
+/// the intrinsics of a camera are those of another resolution. Centres of lenses are nearer to
+/// those of images.
 const MAX_PIXEL_REACH: f64 = 1.2;
 /// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
 /// \[m\].
@@ -76,8 +76,8 @@ impl Measurements {
         Some(Warning { location: self.location(row).with_key(column), kind })
     }
 
-    /// Returns a warning about a camera without a declared size of its image, whose pixels reach far
-    /// beyond twice its declared centre along both axes, as images of a higher resolution do.
+    /// Returns a warning about a camera without a declared size of its image, whose pixels reach
+    /// far beyond twice its declared centre along both axes, as images of a higher resolution do.
     fn other_resolution(&self, problem: &Problem) -> Option<Warning> {
         let mut farthest = BTreeMap::new();
         for row in 0..self.len() {

@@ -175,15 +175,15 @@ fn tool_entry(
         let mistake = mistaken_target(declared, fitted)
             .map_or_else(String::new, |mistake| format!("{mistake}: correct target_m; otherwise "));
         format!(
-            "{mistake}enter the target in [tool] if the tool was declared wrongly or not at all; an \
-             error in d of the last joint looks the same"
+            "{mistake}enter the target in [tool] if the tool was declared wrongly or not at all; \
+             an error in d of the last joint looks the same"
         )
     };
     ContradictedEntry { words, remedy }
 }
 
-/// Returns the words for exchanged coordinates or another unit of the declared target, with which it
-/// is near the fitted one \[m\].
+/// Returns the words for exchanged coordinates or another unit of the declared target, with which
+/// it is near the fitted one \[m\].
 fn mistaken_target(declared: Vector3<f64>, fitted: Vector3<f64>) -> Option<String> {
     let limit = MAX_TARGET_MISMATCH * (fitted - declared).norm();
     let exchanged = [(0, 1), (0, 2), (1, 2)].into_iter().find(|&(first, second)| {

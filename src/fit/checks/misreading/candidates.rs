@@ -276,8 +276,8 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     forms
 }
 
-/// Returns the misreadings that two different lengths of one joint, or of two neighbouring ones, are
-/// exchanged.
+/// Returns the misreadings that two different lengths of one joint, or of two neighbouring ones,
+/// are exchanged.
 fn of_exchanged_lengths(problem: &Problem) -> Vec<Misreading> {
     let entries = |joint: usize| [JointField::A, JointField::D].map(|field| (joint, field));
     let joints = 1..=problem.joints.len();

@@ -106,7 +106,8 @@ impl Misreading {
             format!("a and d of row {first} of the joint table that are exchanged")
         } else {
             format!(
-                "{field} of row {first} and {other} of row {second} of the joint table that are exchanged"
+                "{field} of row {first} and {other} of row {second} of the joint table \
+                 that are exchanged"
             )
         })
     }
