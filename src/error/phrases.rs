@@ -138,9 +138,11 @@ pub(super) fn behind_camera_remedy(fits: Option<bool>, miss: Option<f64>) -> Str
     let miss = miss.map_or_else(|| "far".to_owned(), |miss| format!("by {miss:.1} px"));
     match fits {
         Some(true) => {
-            "each image by itself fits the marker, so that lens and points are right; check \
-             units (radians under _deg?), signs and order of the joint columns, whether joints \
-             and images belong together, and at_m and rotation_deg of camera and marker"
+            "each image by itself fits the marker, so that the points are right; check units \
+             (radians under _deg?), signs and order of the joint columns, whether joints and \
+             images belong together, whether focal_px and centre_px are of the resolution of the \
+             images, \
+             and at_m and rotation_deg of camera and marker"
                 .to_owned()
         }
         Some(false) => format!(

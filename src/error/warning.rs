@@ -12,8 +12,11 @@ use super::phrases::{and_more, plural};
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum WarningKind {
-    #[error("unknown column{}; ignored{}", did_you_mean(meant.as_deref()), covariate_hint(meant.as_deref()))]
-    ColumnIgnored { meant: Option<String> },
+    #[error(
+        "unknown column{}; ignored{}",
+        did_you_mean(meant.as_deref()), covariate_hint(meant.as_deref(), *is_angle)
+    )]
+    ColumnIgnored { meant: Option<String>, is_angle: bool },
     #[error(
         "no column of {} has a name of [data.columns]; the table is read by flexcal's names",
         file.display()
@@ -51,6 +54,14 @@ pub enum WarningKind {
         image[0], image[1], more_rows(*rows)
     )]
     OutsideImage { value: String, camera: String, image: [String; 2], rows: usize },
+    #[error(
+        "pixels of the camera \"{camera}\" reach {}, {}, but its centre_px is that of images of \
+         {} × {} pixels: if its intrinsics were found at another resolution, multiply focal_px and \
+         centre_px by \
+         the ratio of the resolutions",
+        pixel[0], pixel[1], image[0], image[1]
+    )]
+    OtherResolution { camera: String, pixel: [String; 2], image: [String; 2] },
     #[error("the search for effects uses positions only, not orientations")]
     OrientationLeftOut,
     #[error(
@@ -334,8 +345,16 @@ fn additional_rows(rows: usize) -> String {
 }
 
 /// Returns the hint for a column that does not resemble a known one.
-fn covariate_hint(meant: Option<&str>) -> &'static str {
-    if meant.is_none() { " (name it in [data.covariates] if the arm may depend on it)" } else { "" }
+fn covariate_hint(meant: Option<&str>, is_angle: bool) -> &'static str {
+    match (meant, is_angle) {
+        (Some(_), _) => "",
+        (None, true) => {
+            " (if it is a joint of the arm, its [[joint]] is missing: from a URDF, flexcal init \
+             with another --tip adds it; if the arm may only depend on it, name it in \
+             [data.covariates])"
+        }
+        (None, false) => " (name it in [data.covariates] if the arm may depend on it)",
+    }
 }
 
 /// Returns the remedy for rows without a partner whose names differ from one only in spelling:

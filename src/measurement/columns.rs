@@ -152,7 +152,8 @@ impl Columns {
                         let kind = TableErrorKind::MistypedColumn { meant: meant.clone() };
                         mistyped.get_or_insert_with(|| error(kind.into()));
                     }
-                    let kind = WarningKind::ColumnIgnored { meant };
+                    let is_angle = name.ends_with("_joint_deg") || name.ends_with("_joint_rad");
+                    let kind = WarningKind::ColumnIgnored { meant, is_angle };
                     warnings.push(Warning { location: table.column(name), kind });
                 }
             }

@@ -1,10 +1,16 @@
 //! Warnings about doubtful rows and words of a table: an instrument that held its last value, a
 //! pixel outside its image, and session names that are written in two ways.
 
+use std::collections::BTreeMap;
+
 use super::Measurements;
 use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Joint, JointKind, Observation, Problem};
 
+/// Smallest ratio of the farthest pixel to twice the centre of the image, along both axes, at which
+/// the intrinsics of a camera are those of another resolution. Centres of lenses are nearer to
+/// those of images.
+const MAX_PIXEL_REACH: f64 = 1.2;
 /// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
 /// \[m\].
 const MIN_TURN: f64 = std::f64::consts::PI / 180.0;
@@ -21,7 +27,7 @@ impl Measurements {
             .or_else(|| self.rows_of_another_session(sigma))
             .or_else(|| self.rounded_copies(problem));
         let held = self.held_positions(problem);
-        let outside = self.pixels_outside(problem);
+        let outside = self.pixels_outside(problem).or_else(|| self.other_resolution(problem));
         repeated.into_iter().chain(held).chain(self.time_going_back()).chain(outside).collect()
     }
 
@@ -68,6 +74,32 @@ impl Measurements {
             rows: 1 + found.count(),
         };
         Some(Warning { location: self.location(row).with_key(column), kind })
+    }
+
+    /// Returns a warning about a camera without a declared size of its image, whose pixels reach
+    /// far beyond twice its declared centre along both axes, as images of a higher resolution do.
+    fn other_resolution(&self, problem: &Problem) -> Option<Warning> {
+        let mut farthest = BTreeMap::new();
+        for row in 0..self.len() {
+            let Observation::Pixel(camera, ..) = self.observation(row) else { continue };
+            let pixel = self.positions.get(row)?;
+            let reach: &mut [f64; 2] = farthest.entry(camera).or_default();
+            *reach = [reach[0].max(pixel.x), reach[1].max(pixel.y)];
+        }
+        farthest.into_iter().find_map(|(camera, reach)| {
+            let fixture = problem.fixtures.get(camera as usize)?;
+            let place = fixture.kind.fields().iter().position(|field| *field == "cx")?;
+            let centre = fixture.known.get(place..place + 2).filter(|_| fixture.image.is_none())?;
+            let centre = [centre[0]?, centre[1]?];
+            let is_beyond =
+                |axis: usize| reach[axis] > MAX_PIXEL_REACH * 2.0 * centre[axis].max(1.0);
+            let kind = WarningKind::OtherResolution {
+                camera: fixture.name.clone(),
+                pixel: reach.map(|value| format!("{value:.0}")),
+                image: centre.map(|value| format!("{:.0}", 2.0 * value)),
+            };
+            (is_beyond(0) && is_beyond(1)).then(|| Warning { location: self.location(0), kind })
+        })
     }
 
     /// Returns a warning if rows measure exactly the position of the row above them, although the

@@ -108,7 +108,9 @@ fn remarks(found: &Identification) -> Vec<String> {
     let rest_on_priors =
         unidentifiable.iter().filter(|combination| rests_on_priors(found, combination)).count();
     let parameters = counted(found.unknowns.len(), "parameter");
-    let open = format!("of the {parameters} cannot be identified (see -v)");
+    let open = format!(
+        "of the {parameters} cannot be identified: hold parameters or give them priors (see -v)"
+    );
     let is = if rest_on_priors == 1 { "is" } else { "are" };
     let by_priors = format!("of the {parameters} {is} known from the priors alone (see -v)");
     let counts = [

@@ -51,6 +51,10 @@ impl Check for ScaleHolds {
     }
 }
 
+/// Smallest common relative deviation of the lengths at which the arm may be one of another size of
+/// its series. Instruments err by less.
+const MIN_VARIANT_ERROR: f64 = 0.03;
+
 /// Returns the remedy for lengths that are all `factor` times the declared ones.
 fn remedy(fit: &CheckedFit, factor: f64) -> String {
     let leading = fit.fitting.measurements.leading();
@@ -88,7 +92,12 @@ fn remedy(fit: &CheckedFit, factor: f64) -> String {
             )
         }
         _ => format!(
-            "check the scale of the measurements (unit, scale factor of the instrument), {arm}"
+            "check the scale of the measurements (unit, scale factor of the instrument){}, {arm}",
+            if (factor - 1.0).abs() > MIN_VARIANT_ERROR {
+                ", whether the joint table or the URDF is of another size of this arm"
+            } else {
+                ""
+            }
         ),
     }
 }

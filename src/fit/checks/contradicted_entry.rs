@@ -19,6 +19,10 @@ const MAX_DIGIT_MISMATCH: f64 = 0.03;
 /// Largest distance of the fitted target from the declared one rotated by 180° about z, as a
 /// fraction of the target's distance from the z axis.
 const MAX_TURN_MISMATCH: f64 = 0.1;
+/// Largest distance of the fitted target from the declared one with exchanged coordinates or in
+/// another unit, relative to its distance from the declared one or to its length. An error in d of
+/// the last joint moves it as well.
+const MAX_TARGET_MISMATCH: f64 = 0.15;
 /// Smallest distance of a declared target from the z axis for which a rotation by 180° about z is
 /// considered \[m\].
 const MIN_TURNED_RADIUS: f64 = 1e-3;
@@ -38,6 +42,26 @@ pub(super) struct ContradictedEntry {
 /// `parameter` is the one with the largest deviation `x` from nominal, in σ of its prior. `is_far`
 /// returns true for a parameter and its deviation if the deviation is far beyond the prior.
 pub(super) fn contradicted_entry(
+    fit: &CheckedFit,
+    deviation: (&Parameter, f64),
+    is_far: impl Fn(&Parameter, f64) -> bool,
+) -> Option<ContradictedEntry> {
+    single_entry(fit, deviation, is_far).or_else(|| freed_target(fit))
+}
+
+/// Returns the declared target if a fit without its prior explains the measurements and leaves all
+/// other parameters within their priors.
+fn freed_target(fit: &CheckedFit) -> Option<ContradictedEntry> {
+    let kind = fit.fitting.measurements.leading();
+    let declared = fit.problem.tool.target;
+    let (moved, rms) = fit.freed_target().filter(|_| kind.is_position())?;
+    let is_explained = rms <= MAX_REMAINING_FRACTION * (moved - declared).norm();
+    is_explained
+        .then(|| tool_entry(fit.problem, declared, moved, &format_error(kind.kind(), rms, 2)))
+}
+
+/// Returns the entry of `parameter`, with the deviation `x`, if no other one deviates far.
+fn single_entry(
     fit: &CheckedFit,
     (parameter, x): (&Parameter, f64),
     is_far: impl Fn(&Parameter, f64) -> bool,
@@ -146,11 +170,37 @@ fn tool_entry(
     let is_turned = radius > MIN_TURNED_RADIUS && (to - turned).norm() < MAX_TURN_MISMATCH * radius;
     let remedy = if is_turned {
         "the tool is turned by 180° about z: correct x and y of the tool or of its fixed joint"
+            .to_owned()
     } else {
-        "enter the target in [tool] if the tool was declared wrongly or not at all; an error in d \
-         of the last joint looks the same"
+        let mistake = mistaken_target(declared, fitted)
+            .map_or_else(String::new, |mistake| format!("{mistake}: correct target_m; otherwise "));
+        format!(
+            "{mistake}enter the target in [tool] if the tool was declared wrongly or not at all; \
+             an error in d of the last joint looks the same"
+        )
     };
-    ContradictedEntry { words, remedy: remedy.to_owned() }
+    ContradictedEntry { words, remedy }
+}
+
+/// Returns the words for exchanged coordinates or another unit of the declared target, with which
+/// it is near the fitted one \[m\].
+fn mistaken_target(declared: Vector3<f64>, fitted: Vector3<f64>) -> Option<String> {
+    let limit = MAX_TARGET_MISMATCH * (fitted - declared).norm();
+    let exchanged = [(0, 1), (0, 2), (1, 2)].into_iter().find(|&(first, second)| {
+        let mut meant = declared;
+        meant.swap_rows(first, second);
+        (meant - fitted).norm() < limit
+    });
+    if let Some((first, second)) = exchanged {
+        let name = |axis: usize| ['x', 'y', 'z'][axis];
+        return Some(format!("{} and {} seem to be exchanged", name(first), name(second)));
+    }
+    let units = [(1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches")];
+    let is_unit = |(factor, _): &(f64, &str)| {
+        (declared * *factor - fitted).norm() < MAX_TARGET_MISMATCH * fitted.norm()
+    };
+    let (_, unit) = units.into_iter().find(is_unit)?;
+    Some(format!("the numbers seem to be {unit} under a key in metres"))
 }
 
 /// Describes the orientation of the target of `[tool]` as declared and as fitted \[rad\]. `left` is

@@ -175,7 +175,7 @@ fn sorted_by_itself(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let text = format!(
         "the coordinate {name} is sorted from the first row to the last, no other column of positions \
          and joints is, and the fitted arm misses the measurements by {}: this column was probably \
-         sorted by itself",
+         sorted by itself, or the positions by it without their joint angles",
         format_error("position", before, 1)
     );
     Some(finding(&[name], before, None, text))

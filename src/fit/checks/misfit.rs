@@ -96,7 +96,8 @@ fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
         text,
         if rms > MIN_OTHER_ARM_MISS * spread {
             format!(
-                "check units, signs of joints, {suspects}, and whether the table is one of this arm"
+                "check units, signs of joints, {suspects}, and whether the table is one of this \
+                 arm, with the measurement of each row beside its own joint angles"
             )
         } else {
             format!("check units, signs of joints, and {suspects}")

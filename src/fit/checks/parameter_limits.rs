@@ -21,6 +21,9 @@ pub(super) const MAX_PRIOR_SIGMAS: f64 = 5.0;
 /// Smallest number of further lengths far beyond their priors at which the table is probably one of
 /// another arm.
 const MIN_FURTHER_LENGTHS: usize = 2;
+/// Largest deviation from nominal of an angle \[rad\], or of a length relative to the reach, that
+/// remains after the arm was built and set up: 0.11°, or 2 mm for each metre.
+const MAX_BUILT_DEVIATION: f64 = 2e-3;
 /// Usual σ of priors of angles \[°\]. A σ that is in this range if it is read in radians may be meant
 /// so.
 const USUAL_ANGLE_SIGMAS: std::ops::RangeInclusive<f64> = 0.05..=5.0;
@@ -159,14 +162,30 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
             "{scale}, from which all lengths follow; then axes, signs of joints, and the prior"
         ));
     }
-    let sigma = parameter.sigma.filter(|_| parameter.unit() == Unit::Angle)?.to_degrees();
-    let in_radians = sigma.to_degrees();
+    let sigma = parameter.sigma.filter(|_| parameter.unit() == Unit::Angle).map(f64::to_degrees);
+    let in_radians = sigma.unwrap_or_default().to_degrees();
     let is_usual = USUAL_ANGLE_SIGMAS.contains(&in_radians);
-    (is_usual && sigmas.to_radians() < MAX_PRIOR_SIGMAS).then(|| {
+    let sigma = sigma.filter(|_| is_usual && sigmas.to_radians() < MAX_PRIOR_SIGMAS);
+    let in_words = sigma.map(|sigma| {
         format!(
             "if the σ of {sigma:.4}° is meant in radians ({in_radians:.2}°), write sigma_rad; otherwise \
              check axes of the measuring frame, signs of joints, and units"
         )
+    });
+    in_words.or_else(|| {
+        let x = fitted_deviation(fit, parameter)?.abs();
+        let is_small = match parameter.unit() {
+            Unit::Length => x < MAX_BUILT_DEVIATION * fit.fitting.model.reach(),
+            Unit::Angle => x < MAX_BUILT_DEVIATION,
+            _ => false,
+        };
+        is_small.then(|| {
+            "arms are built with such deviations, so that the σ of this prior is too small: \
+             declare a larger one in [parameters]; then check axes of the measuring frame, signs \
+             of joints, \
+             and units"
+                .to_owned()
+        })
     })
 }
 

@@ -71,6 +71,7 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
         units.extend((0..3).map(|axis| Misreading::AxisInches { axis }));
     }
     units.push(Misreading::Mirrored);
+    units.extend(table.orientations.is_some().then_some(Misreading::InversePose));
     units.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
     units.extend(long.then_some(Misreading::ArmInMillimetres));
     units.extend(of_commands(problem));
@@ -173,14 +174,20 @@ pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     places.flat_map(of_place).collect()
 }
 
-/// Returns the misreadings in which one of two joined tables is sorted by the text of its row
-/// numbers. The order differs from that of the numbers from ten rows on.
+/// Returns the misreadings of the order of all rows: one of two joined tables is sorted by the text
+/// of its row numbers, which differs from the order of the numbers from ten rows on, or it is
+/// reversed.
 fn of_text_order(table: &Measurements) -> Vec<Misreading> {
     let order = |first| {
         let of = move |is_of_joints| Misreading::TextOrder { first, is_of_joints };
         [false, true].map(of)
     };
-    if table.len() < 10 { Vec::new() } else { [0, 1].into_iter().flat_map(order).collect() }
+    let reversed = [Misreading::ReversedRows];
+    if table.len() < 10 {
+        Vec::new()
+    } else {
+        [0, 1].into_iter().flat_map(order).chain(reversed).collect()
+    }
 }
 
 /// Returns the indices of the joints that take commands, in the alphabetical order of their names.
@@ -211,7 +218,7 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     let mut forms = vec![Misreading::StandardForm, Misreading::ModifiedForm];
     let rows = problem.standard_rows().map_or(problem.joints.len(), <[Joint]>::len);
     forms.extend((1..rows).map(|row| Misreading::ExchangedRows { row }));
-    forms.extend((1..=rows).map(|row| Misreading::ExchangedLengths { row }));
+    forms.extend(of_exchanged_lengths(problem));
     let fields = [Alpha, Theta, Beta];
     for field in fields {
         let mut counts = [0; 2];
@@ -267,6 +274,29 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
         }
     }
     forms
+}
+
+/// Returns the misreadings that two different lengths of one joint, or of two neighbouring ones,
+/// are exchanged.
+fn of_exchanged_lengths(problem: &Problem) -> Vec<Misreading> {
+    let entries = |joint: usize| [JointField::A, JointField::D].map(|field| (joint, field));
+    let joints = 1..=problem.joints.len();
+    let pairs = joints.flat_map(|joint| {
+        let near = entries(joint).into_iter().chain(entries(joint + 1));
+        let first = entries(joint).into_iter();
+        first.flat_map(move |(joint, field)| {
+            let later = move |(with, other): &(usize, JointField)| {
+                *with > joint || field == JointField::A && *other == JointField::D
+            };
+            near.clone().filter(later).map(move |(with, other)| Misreading::ExchangedLengths {
+                joint,
+                field,
+                with,
+                other,
+            })
+        })
+    });
+    pairs.filter(|pair| pair.rewritten(problem).is_some()).collect()
 }
 
 /// Returns misreadings of masses and payloads by each of `scales`.

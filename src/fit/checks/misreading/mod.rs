@@ -11,6 +11,7 @@ mod explanation;
 mod images;
 mod masses;
 mod search;
+mod target;
 mod undo;
 mod words;
 
@@ -69,6 +70,10 @@ pub enum Misreading {
         /// True if the configurations are sorted so, false if the positions are.
         is_of_joints: bool,
     },
+    /// Positions are in the opposite order of the rows.
+    ReversedRows,
+    /// Poses are inverse: of the measuring frame in the frame of the target.
+    InversePose,
     /// The columns of all joints are shifted to the right; the last ones come first.
     Rotated {
         /// Number of places by which the columns are shifted to the right.
@@ -157,10 +162,16 @@ pub enum Misreading {
         /// Number of the first row, from 1.
         row: usize,
     },
-    /// The lengths a and d of a row of the joint table are exchanged.
+    /// Two lengths a or d of one joint or of two neighbouring joints are exchanged.
     ExchangedLengths {
-        /// Number of the row, from 1.
-        row: usize,
+        /// Number of the first length's joint, from 1.
+        joint: usize,
+        /// First length.
+        field: JointField,
+        /// Number of the second length's joint: the same or the next one.
+        with: usize,
+        /// Second length.
+        other: JointField,
     },
     /// The angle α of the joint table is wrong by a multiple of 90°.
     Twist {
@@ -329,7 +340,10 @@ impl Misreading {
                 (fixture, with, None)
             }
             Self::AxisUnit { axis, .. } | Self::AxisInches { axis } => (axis, 0, None),
-            Self::ExchangedRows { row } | Self::ExchangedLengths { row } => (row, 0, None),
+            Self::ExchangedRows { row } => (row, 0, None),
+            Self::ExchangedLengths { joint, field, with, other } => {
+                (joint, 2 * with + usize::from(other == JointField::D), Some(field))
+            }
             Self::Reversed { joints } => (usize::try_from(joints).unwrap_or(usize::MAX), 0, None),
             _ => (0, 0, None),
         };

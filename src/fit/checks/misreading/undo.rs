@@ -115,12 +115,19 @@ impl Misreading {
                     exchange_joint_rows(first, second)
                 });
             }
-            Self::ExchangedLengths { row } => {
-                return declared.with_changed_joint_rows(|rows| {
-                    let joint = rows.get_mut(row - 1)?;
-                    let can_change = joint.a.total_cmp(&joint.d).is_ne() && joint.beam.is_none();
-                    can_change.then(|| std::mem::swap(&mut joint.a, &mut joint.d))
-                });
+            Self::ExchangedLengths { joint, field, with, other } => {
+                let value = |joint: usize, field| {
+                    let found = declared.joints.get(joint - 1)?;
+                    let has_row = found.placement.is_none() && found.beam.is_none();
+                    number_of(&mut found.clone(), field).copied().filter(|_| has_row)
+                };
+                let (first, second) = (value(joint, field)?, value(with, other)?);
+                if first.total_cmp(&second).is_eq() {
+                    return None;
+                }
+                *number_of(&mut problem.joints[joint - 1], field)? = second;
+                *number_of(&mut problem.joints[with - 1], other)? = first;
+                return Some(problem);
             }
             Self::Payload { scale } => problem.tool.payload_mass *= scale.factor(),
             Self::Mass { .. }
@@ -298,6 +305,13 @@ impl Misreading {
             Self::Mirrored => {
                 rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
             }
+            Self::InversePose => {
+                let turns = rows.orientations.iter_mut().flatten();
+                for (position, turn) in rows.positions.iter_mut().zip(turns) {
+                    *turn = turn.inverse();
+                    *position = -(*turn * *position);
+                }
+            }
             Self::ExchangedAxes | Self::FromBottom | Self::Transposed => {
                 self.undo_image(&mut rows, problem);
             }
@@ -335,6 +349,10 @@ impl Misreading {
 
     /// Corrects the order of positions in `rows`, the `chosen` ones of `table`.
     fn undo_order(self, rows: &mut Measurements, table: &Measurements, chosen: &[usize]) {
+        if self == Self::ReversedRows {
+            rows.positions =
+                chosen.iter().map(|&row| table.positions[table.len() - 1 - row]).collect();
+        }
         let Self::TextOrder { first, is_of_joints } = self else { return };
         let numbers = text_order(table.len(), first);
         let index = |number: usize| number - usize::from(first);

@@ -30,7 +30,8 @@ impl Misreading {
     /// has one. If an entry of the joint table is misread, its place in the file is added.
     pub(super) fn described(self, size: Option<f64>, problem: &Problem) -> String {
         if let Some(place) = self.place(problem) {
-            return format!("{self} ({place})");
+            let words = self.lengths_of_rows(problem).unwrap_or_else(|| self.to_string());
+            return format!("{words} ({place})");
         }
         match (self, size) {
             (Self::Zero { joint, .. }, Some(size)) => {
@@ -93,6 +94,24 @@ impl Misreading {
         }
     }
 
+    /// Describes exchanged lengths by the rows of the declared joint table; `None` for other
+    /// misreadings. In a table in standard DH form, a of a joint is in the row before.
+    fn lengths_of_rows(self, problem: &Problem) -> Option<String> {
+        let Self::ExchangedLengths { joint, field, with, other } = self else { return None };
+        let is_standard = problem.standard_rows().is_some();
+        let row = |joint: usize, field| joint - usize::from(is_standard && field == JointField::A);
+        let (first, second) = (row(joint, field), row(with, other));
+        let [field, other] = [field, other].map(JointField::name);
+        Some(if first == second {
+            format!("a and d of row {first} of the joint table that are exchanged")
+        } else {
+            format!(
+                "{field} of row {first} and {other} of row {second} of the joint table \
+                 that are exchanged"
+            )
+        })
+    }
+
     /// Returns the place in the file of the entry or row of the joint table that is misread; `None`
     /// for other misreadings. In a table in standard DH form, a and α of a joint are in the row
     /// before.
@@ -107,7 +126,10 @@ impl Misreading {
                 joint.checked_sub(usize::from(is_standard && matches!(field, A | Alpha)))?
             }
             Self::Twist { joint, .. } => joint.checked_sub(usize::from(is_standard))?,
-            Self::ExchangedRows { row } | Self::ExchangedLengths { row } => row,
+            Self::ExchangedLengths { joint, field, .. } => {
+                joint.checked_sub(usize::from(is_standard && field == A)).filter(|row| *row > 0)?
+            }
+            Self::ExchangedRows { row } => row,
             _ => return None,
         };
         let location = &problem.joints.get(row.checked_sub(1)?)?.location;
@@ -175,6 +197,11 @@ impl fmt::Display for Misreading {
                      join the tables by name or number, not by order)"
                 )
             }
+            Self::ReversedRows => f.write_str("positions in the opposite order of the rows"),
+            Self::InversePose => f.write_str(
+                "poses that are inverse (of the measuring frame in the frame of the target; invert \
+                 each 4 × 4 matrix)",
+            ),
             Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
             Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
             Self::Inches => f.write_str("positions that are inches, declared as millimetres"),
@@ -328,8 +355,9 @@ impl Misreading {
             Self::ExchangedRows { row } => {
                 write!(f, "rows {row} and {} of the joint table that are exchanged", row + 1)
             }
-            Self::ExchangedLengths { row } => {
-                write!(f, "a and d of row {row} of the joint table that are exchanged")
+            Self::ExchangedLengths { joint, field, with, other } => {
+                let [first, second] = [entry_name(joint, field), entry_name(with, other)];
+                write!(f, "{first} and {second} that are exchanged")
             }
             Self::StandardForm => {
                 f.write_str("a joint table in standard DH form (declare dh = \"standard\")")

@@ -1,0 +1,39 @@
+//! Fit with a free target, for a target that is declared far from where it is.
+
+use nalgebra::Vector3;
+
+use super::Misreading;
+use super::search::Trial;
+use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::parameter_limits::{MAX_PRIOR_SIGMAS, prior_sigmas};
+use crate::model::parameter::ParameterSite;
+
+impl CheckedFit<'_> {
+    /// Returns the place of the target of `[tool]` in its frame \[m\] from a fit without its prior,
+    /// and the rms residual of that fit \[m\].
+    ///
+    /// `None` for a problem with several targets, or if another parameter of that fit deviates far
+    /// beyond its prior. With its prior, a target that is declared far off deviates together with
+    /// all parameters that act alike.
+    pub fn freed_target(&self) -> Option<(Vector3<f64>, f64)> {
+        if !self.has_further_fits || !self.problem.targets.is_empty() {
+            return None;
+        }
+        Trial::new(self).with_corrected(Misreading::HeldTarget, false, |fitting, _| {
+            let end = fitting.run(&fitting.registered().ok()?).ok()?;
+            let mut target = self.problem.tool.target;
+            for (parameter, x) in fitting.model.parameters.iter().zip(&end.x) {
+                if prior_sigmas(parameter, *x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS) {
+                    return None;
+                }
+                if let ParameterSite::Target { axis: axis @ 0..3, .. } = parameter.site {
+                    target[axis] += x;
+                }
+            }
+            let rows = &fitting.split.identification;
+            let errors = fitting.position_errors(rows, &end.x);
+            let squares: f64 = errors.iter().map(nalgebra::Matrix::norm_squared).sum();
+            Some((target, (squares / rows.len().max(1) as f64).sqrt()))
+        })
+    }
+}
