@@ -211,6 +211,9 @@ impl Results {
     fn check(&self, record: &FolderRecord, name: &str) -> Result<(), WriteError> {
         let path = self.path(name);
         let why = |why| Err(WriteError::InTheWay { path: path.clone(), why });
+        if name.starts_with(FolderRecord::NAME) {
+            return why("names with .flexcal in front are for flexcal's own records");
+        }
         if path.is_dir() {
             return why("a folder of that name is in the way");
         }

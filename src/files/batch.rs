@@ -1,8 +1,9 @@
 //! Files of one result, which take their places in the folder together.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::staged::{StagedFile, folder_of, sync_folder};
 use super::{FolderLock, FolderRecord, open};
@@ -131,7 +132,7 @@ pub(super) fn finish(folder: &Path) -> io::Result<()> {
 
 /// Returns true if a name leads to a place below its folder.
 fn is_below(name: &str) -> bool {
-    Path::new(name).components().all(|part| matches!(part, std::path::Component::Normal(_)))
+    Path::new(name).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
 /// Moves the files of the stage, but those for which `is_kept` returns true, then removes the
@@ -168,11 +169,9 @@ fn clear(folder: &Path, record: &FolderRecord) -> io::Result<()> {
 
 /// Waits until the disk holds the names in a folder and in the subfolders of recorded files.
 fn sync_folders(folder: &Path, record: &FolderRecord) {
-    let mut above: Vec<&Path> = record.names().map(|name| folder_of(Path::new(name))).collect();
-    above.sort();
-    above.dedup();
-    above.into_iter().for_each(|above| sync_folder(&folder.join(above)));
-    sync_folder(folder);
+    let names = record.names().chain([FolderRecord::NAME]);
+    let subfolders: BTreeSet<&Path> = names.map(|name| folder_of(Path::new(name))).collect();
+    subfolders.into_iter().for_each(|subfolder| sync_folder(&folder.join(subfolder)));
 }
 
 /// Returns no error if a file is missing, because another process has moved it.

@@ -16,7 +16,7 @@ pub use batch::Batch;
 pub(crate) use format::Format;
 pub use format::{FORMAT_VERSION, PROGRAM};
 pub use lock::{FolderLock, MAX_LOCK_WAIT};
-pub use record::{FolderRecord, digest};
+pub use record::{FolderRecord, digest, was_changed};
 pub use sealed::Changes;
 pub(crate) use sealed::{DIGEST_KEY, changed_key, sealed};
 pub use staged::write_new;

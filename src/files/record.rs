@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest as _, Sha256};
 
 use super::read_limited;
+use super::staged::folder_of;
 
 /// Maximum size of a record that is read \[bytes\].
 const MAX_RECORD_BYTES: u64 = 1 << 20;
@@ -32,9 +33,18 @@ pub fn digest(bytes: &[u8]) -> String {
     hexadecimal(Sha256::digest(bytes).as_slice())
 }
 
+/// Returns true if flexcal wrote the file to its folder, and the file was changed since.
+pub fn was_changed(file: &Path) -> bool {
+    let Some(name) = file.file_name().and_then(|name| name.to_str()) else { return false };
+    let folder = folder_of(file);
+    FolderRecord::read(folder).is_ok_and(|record| {
+        record.names().any(|recorded| recorded == name) && record.writer(folder, name).is_none()
+    })
+}
+
 impl FolderRecord {
-    /// Name of the record file.
-    pub(super) const NAME: &str = ".flexcal";
+    /// Name of the record file, with which the names of all other files of flexcal's own begin.
+    pub const NAME: &str = ".flexcal";
 
     /// Reads the record of a folder; returns an empty record if there is none.
     ///
