@@ -33,8 +33,8 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 
 /// Opens a file for reading. Returns an error for folders, FIFOs, sockets, devices and files of the
 /// kernel (`/proc`, `/sys`), which could block or never end. The standard input is allowed as
-/// `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`. If a process was killed while it wrote results to
-/// the folder of the file, they are completed first.
+/// `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`. If a process was killed while it wrote results
+/// to the folder of the file, they are completed first.
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened, or is no regular file.
