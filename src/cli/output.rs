@@ -161,8 +161,12 @@ impl Results {
             is_left(name) || (is_outdated(name) && record.writer(&self.folder, name).is_some())
         };
         let outdated: Vec<String> = record.names().filter(is_removed).map(str::to_owned).collect();
-        texts.iter().for_each(|(name, text)| record.add(self.command, name, text));
-        outdated.iter().for_each(|name| record.remove(name));
+        for (name, text) in texts {
+            record.add(self.command, name, text);
+        }
+        for name in &outdated {
+            record.remove(name);
+        }
         let exit_blocked = interrupt::block_exit();
         batch.commit(&lock, &record, &outdated).map_err(failed(self.folder.clone()))?;
         drop((exit_blocked, lock));

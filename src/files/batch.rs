@@ -171,7 +171,9 @@ fn clear(folder: &Path, record: &FolderRecord) -> io::Result<()> {
 fn sync_folders(folder: &Path, record: &FolderRecord) {
     let names = record.names().chain([FolderRecord::NAME]);
     let subfolders: BTreeSet<&Path> = names.map(|name| folder_of(Path::new(name))).collect();
-    subfolders.into_iter().for_each(|subfolder| sync_folder(&folder.join(subfolder)));
+    for subfolder in subfolders {
+        sync_folder(&folder.join(subfolder));
+    }
 }
 
 /// Returns no error if a file is missing, because another process has moved it.
@@ -206,7 +208,9 @@ mod tests {
             batch.add(name, text).unwrap();
             record.add("identify", name, text);
         }
-        outdated.iter().for_each(|name| record.remove(name));
+        for name in outdated {
+            record.remove(name);
+        }
         let outdated: Vec<String> = outdated.iter().map(|&name| name.to_owned()).collect();
         batch.commit(&lock, &record, &outdated).unwrap();
     }
@@ -253,9 +257,9 @@ mod tests {
             for (name, _) in NEW.iter().take(moved) {
                 fs::rename(stage.join(name), folder.join(name)).unwrap();
             }
-            OUTDATED.iter().take(moved.saturating_sub(3)).for_each(|name| {
+            for name in OUTDATED.iter().take(moved.saturating_sub(3)) {
                 fs::remove_file(folder.join(name)).unwrap();
-            });
+            }
             if moved == 6 {
                 fs::rename(FolderRecord::file(&stage), FolderRecord::file(folder)).unwrap();
             }
