@@ -64,19 +64,17 @@ impl Batch {
         record: &FolderRecord,
         outdated: &[String],
     ) -> io::Result<()> {
-        let Self { folder, files } = self;
+        let Self { folder, mut files } = self;
         let written = files.iter().map(|(name, _)| name);
         let replaced = FolderRecord::of_files(&folder, written.chain(outdated));
+        for (name, record) in [(FolderRecord::NAME, record), (REPLACED_FILE, &replaced)] {
+            files.push((name.to_owned(), StagedFile::new(&folder, &record.text(), None)?));
+        }
         let stage = builder().tempdir_in(&folder)?;
-        let place = |file: StagedFile, name: &str| {
+        for (name, file) in files {
             let path = stage.path().join(name);
             fs::create_dir_all(folder_of(&path))?;
-            file.place(&path)
-        };
-        files.into_iter().try_for_each(|(name, file)| place(file, &name))?;
-        let own = [(FolderRecord::NAME, record), (REPLACED_FILE, &replaced)];
-        for (name, record) in own {
-            place(StagedFile::new(&folder, &record.text(), None)?, name)?;
+            file.place(&path)?;
         }
         sync_folders(stage.path(), record);
         // A file system frees the blocks of a replaced file within the rename, which may take
