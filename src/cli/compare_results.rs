@@ -9,7 +9,7 @@ use flexcal::report::{self, HeldOutRow, Side, shell_word};
 use nalgebra::Vector3;
 
 use super::diagnostic;
-use super::estimate::Trust;
+use super::estimate::{ChangedTable, Trust};
 use super::outcome::Outcome;
 use super::output::{self, Results};
 
@@ -101,15 +101,18 @@ fn read_side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
     let without = |(key, name)| errors_in(remainder.and_then(|of| of.get(key)), name);
     let keys = [("held_out_without", held_out), ("identification_without", "fitted rows")];
     let without_remainder = keys.map(without).concat();
-    Ok(Side { estimate, errors, without_remainder, held_out: held_out_rows(file) })
+    Ok(Side { estimate, errors, without_remainder, held_out: held_out_rows(file, trust)? })
 }
 
 /// Returns the held-out rows with positions in the residuals.csv beside an estimate.json; empty if
 /// there is no such file. `flexcal identify` writes both files.
-fn held_out_rows(estimate: &Path) -> Vec<HeldOutRow> {
+fn held_out_rows(estimate: &Path, trust: Trust) -> Result<Vec<HeldOutRow>, ChangedTable> {
     let is_identified = estimate.file_name().is_some_and(|name| name == "estimate.json");
     let file = estimate.with_file_name("residuals.csv");
     let text = is_identified.then(|| flexcal::files::read_text(&file).ok()).flatten();
+    if text.is_some() {
+        trust.check_table(&file)?;
+    }
     let text = text.unwrap_or_default();
     let mut table = csv::Reader::from_reader(text.as_bytes());
     let header = table.headers().cloned().unwrap_or_default();
@@ -134,5 +137,5 @@ fn held_out_rows(estimate: &Path) -> Vec<HeldOutRow> {
         };
         (cell("held_out")? == "true").then_some(row)
     };
-    table.records().flatten().filter_map(|row| error(&row)).collect()
+    Ok(table.records().flatten().filter_map(|row| error(&row)).collect())
 }

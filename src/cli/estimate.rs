@@ -1,9 +1,9 @@
 //! Argument of the commands that apply an estimate, and the function that reads the estimate.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::files::Changes;
+use flexcal::files::{Changes, was_changed};
 use flexcal::fit::{SavedEstimate, SavedEstimateError};
 
 use super::diagnostic;
@@ -24,11 +24,33 @@ impl Trust {
         let changes = if self.trust { Changes::Accepted } else { Changes::Refused };
         let estimate = SavedEstimate::read_with(file, changes)?;
         if let Some(key) = &estimate.changed_key {
-            diagnostic::warn(&format!(
-                "{}: {key}: changed since flexcal wrote it; used all the same",
-                file.display()
-            ));
+            warn_of_change(&format!("{}: {key}", file.display()));
         }
         Ok(estimate)
     }
+
+    /// Returns an error if a table beside an estimate was changed since flexcal wrote it, unless
+    /// `trust` is set; then prints a warning.
+    pub fn check_table(self, file: &Path) -> Result<(), ChangedTable> {
+        if !was_changed(file) {
+            return Ok(());
+        }
+        if !self.trust {
+            return Err(ChangedTable { file: file.to_owned() });
+        }
+        warn_of_change(&file.display().to_string());
+        Ok(())
+    }
+}
+
+/// Error of a table that was changed.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: changed since flexcal wrote it; identify again, or use it all the same with --trust", file.display())]
+pub struct ChangedTable {
+    file: PathBuf,
+}
+
+/// Warns that something changed is used.
+fn warn_of_change(place: &str) {
+    diagnostic::warn(&format!("{place}: changed since flexcal wrote it; used all the same"));
 }

@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+use clap::builder::RangedU64ValueParser;
 use clap::{ArgGroup, Args, ValueEnum};
 use flexcal::design::Workspace;
 use flexcal::export as code;
@@ -69,15 +70,20 @@ pub struct Arguments {
     #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = values::numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
     workspace_mm: Option<[f64; 6]>,
     /// Number of poses in the test program of --format c
-    #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]
+    #[arg(long, value_name = "N", default_value_t = 100, requires = "format", value_parser = test_count())]
     test_poses: usize,
     /// Number of these poses at which the test program compares compensated commands too
-    #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]
+    #[arg(long, value_name = "N", default_value_t = 100, requires = "format", value_parser = test_count())]
     test_commands: usize,
     #[command(flatten)]
     trust: Trust,
     #[command(flatten)]
     flags: Flags,
+}
+
+/// Returns the parser of a number of poses in the test program.
+fn test_count() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(0..=10_000)
 }
 
 /// Format of the exported model.

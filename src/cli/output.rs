@@ -3,10 +3,9 @@
 use std::fs;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
-use std::time::Duration;
 
 use flexcal::error::{escape_hidden, is_hidden};
-use flexcal::files::{FolderLock, FolderRecord, StagedFile, same_file};
+use flexcal::files::{Batch, FolderLock, FolderRecord, MAX_LOCK_WAIT, same_file};
 use flexcal::report::{Report, is_figure};
 
 use super::{diagnostic, interrupt};
@@ -15,8 +14,6 @@ use super::{diagnostic, interrupt};
 pub const REPORT: [&str; 2] = ["report.md", "report.html"];
 /// Subfolder of the results for the figures of a report.
 const FIGURES: &str = "figures";
-/// Maximum time for which a command waits while another command writes to the same folder.
-const MAX_LOCK_WAIT: Duration = Duration::from_secs(10);
 
 /// Error of results that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -116,8 +113,7 @@ impl Results {
         self.folder.join(name)
     }
 
-    /// Writes texts, given as (file name, text). All of them are on the disk before the first file
-    /// takes its name, so that each file is complete or absent.
+    /// Writes texts, given as (file name, text). The files appear together or not at all.
     pub fn write(&self, texts: &[(&str, &str)]) -> Result<(), WriteError> {
         self.write_all(texts, |_| false)
     }
@@ -140,17 +136,19 @@ impl Results {
         self.write_all(&texts, is_outdated)
     }
 
-    /// Writes all files or none, as far as file systems allow: obstacles are found before the first
-    /// file takes its name. Removes recorded files for which `is_outdated` returns true, and
-    /// claimed files of an earlier run of this command that are not written now.
+    /// Writes all files or none; see [`Batch`]. Removes recorded files for which `is_outdated`
+    /// returns true, and claimed files of an earlier run of this command that are not written now.
     fn write_all(
         &self,
         texts: &[(&str, &str)],
         is_outdated: impl Fn(&str) -> bool,
     ) -> Result<(), WriteError> {
-        fs::create_dir_all(&self.folder)
-            .map_err(|source| WriteError::Io { path: self.folder.clone(), source })?;
-        let _lock = self.lock()?;
+        let failed = |path: PathBuf| |source| WriteError::Io { path, source };
+        let mut batch = Batch::new(&self.folder).map_err(failed(self.folder.clone()))?;
+        for (name, text) in texts {
+            batch.add(name, text).map_err(failed(self.path(name)))?;
+        }
+        let lock = self.lock()?;
         let mut record = self.record()?;
         texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
         let replaced = self.replaced_by_other_command(&record, texts);
@@ -162,30 +160,16 @@ impl Results {
         let is_removed = |name: &&str| {
             is_left(name) || (is_outdated(name) && record.writer(&self.folder, name).is_some())
         };
-        let mut outdated: Vec<String> =
-            record.names().filter(is_removed).map(str::to_owned).collect();
-        outdated.sort();
-        outdated.dedup();
-        let mut ready = Vec::with_capacity(texts.len());
+        let outdated: Vec<String> = record.names().filter(is_removed).map(str::to_owned).collect();
         for (name, text) in texts {
-            let path = self.path(name);
-            match StagedFile::new(&path, text) {
-                Ok(file) => ready.push(file),
-                Err(source) => return Err(WriteError::Io { path, source }),
-            }
             record.add(self.command, name, text);
         }
-        let _exit_blocked = interrupt::block_exit();
-        // The record is written before the files, with the digests of old and new files. After an
-        // interruption here, the next run still recognises all of them as written by flexcal.
-        self.write_record(&record)?;
-        StagedFile::commit_all(ready).map_err(|(path, source)| WriteError::Io { path, source })?;
         for name in &outdated {
-            let path = self.path(name);
-            fs::remove_file(&path).map_err(|source| WriteError::Io { path, source })?;
+            record.remove(name);
         }
-        record.settle(|name| outdated.iter().any(|removed| *removed == name));
-        self.write_record(&record)?;
+        let exit_blocked = interrupt::block_exit();
+        batch.commit(&lock, &record, &outdated).map_err(failed(self.folder.clone()))?;
+        drop((exit_blocked, lock));
         if let (Some((name, other)), false) = (replaced, self.quiet) {
             let what = if name == REPORT[0] { "the report" } else { &name };
             diagnostic::warn(&format!(
@@ -214,8 +198,10 @@ impl Results {
     /// Locks the folder, so that no other flexcal process writes there at the same time. Returns an
     /// error if another process holds the lock for longer than [`MAX_LOCK_WAIT`].
     fn lock(&self) -> Result<FolderLock, WriteError> {
-        let busy = |_| WriteError::Busy { folder: self.folder.clone() };
-        FolderLock::take(&self.folder, MAX_LOCK_WAIT).map_err(busy)
+        FolderLock::take(&self.folder).map_err(|source| match source.kind() {
+            io::ErrorKind::WouldBlock => WriteError::Busy { folder: self.folder.clone() },
+            _ => WriteError::Io { path: self.folder.clone(), source },
+        })
     }
 
     /// Reads the record of the files that flexcal wrote to the folder.
@@ -224,17 +210,14 @@ impl Results {
             .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
     }
 
-    fn write_record(&self, record: &FolderRecord) -> Result<(), WriteError> {
-        record
-            .write(&self.folder)
-            .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
-    }
-
     /// Returns an error if a result may not take the file name `name`. A folder may have that name,
     /// or the result would replace an input or a file that flexcal did not write.
     fn check(&self, record: &FolderRecord, name: &str) -> Result<(), WriteError> {
         let path = self.path(name);
         let why = |why| Err(WriteError::InTheWay { path: path.clone(), why });
+        if name.starts_with(FolderRecord::NAME) {
+            return why("names with .flexcal in front are for flexcal's own records");
+        }
         if path.is_dir() {
             return why("a folder of that name is in the way");
         }

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use flexcal::files::{self, StagedFile};
+use flexcal::files;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{
     Document as _, MisprintResult, StudyResult, study_csv, study_parameters_csv, study_timing_csv,
@@ -94,8 +94,8 @@ impl<'a> Sentinel<'a> {
 
     /// Writes the file.
     fn write(self) -> Result<(), WriteError> {
-        let ready = StagedFile::new(self.0, Self::TEXT).and_then(StagedFile::commit);
-        ready.map_err(|source| WriteError::Io { path: self.0.to_owned(), source })
+        files::write_new(self.0, Self::TEXT)
+            .map_err(|source| WriteError::Io { path: self.0.to_owned(), source })
     }
 }
 

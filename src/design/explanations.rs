@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::InputError;
-use crate::files::read_limited;
+use crate::files::{read_limited, was_changed};
 use crate::measurement::Measurements;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
@@ -35,6 +35,8 @@ pub enum ExplanationsError {
     Unreadable { file: PathBuf, source: io::Error },
     #[error("{}: not a loop.json: {source}", file.display())]
     Syntax { file: PathBuf, source: serde_json::Error },
+    #[error("{}: changed since flexcal wrote it; run flexcal loop again", file.display())]
+    Changed { file: PathBuf },
     #[error("{}: is of problem {found}, not of {expected}", file.display())]
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error(
@@ -71,13 +73,17 @@ impl Explanations {
     /// Reads the loop.json of `problem`.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read, is no loop.json, or belongs to another problem.
+    /// Returns an error if the file cannot be read, is no loop.json, was changed since flexcal wrote
+    /// it, or belongs to another problem.
     pub fn read(file: &Path, problem: &Problem) -> Result<Self, ExplanationsError> {
         let named = || file.to_owned();
         let unreadable = |source| ExplanationsError::Unreadable { file: named(), source };
         let bytes = read_limited(file, MAX_FILE_MIB << 20).map_err(unreadable)?;
         let document: Document = serde_json::from_slice(&bytes)
             .map_err(|source| ExplanationsError::Syntax { file: named(), source })?;
+        if was_changed(file) {
+            return Err(ExplanationsError::Changed { file: named() });
+        }
         if document.problem != problem.name {
             let (found, expected) = (document.problem, problem.name.clone());
             return Err(ExplanationsError::OtherProblem { file: named(), found, expected });

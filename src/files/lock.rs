@@ -6,6 +6,10 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use super::batch;
+
+/// Maximum time for which a process waits while another one writes to the same folder.
+pub const MAX_LOCK_WAIT: Duration = Duration::from_secs(10);
 /// Pause between two attempts to take a lock.
 const RETRY_INTERVAL: Duration = Duration::from_millis(5);
 
@@ -19,11 +23,21 @@ pub struct FolderLock {
 }
 
 impl FolderLock {
-    /// Locks an existing folder. Waits for at most `patience` if another process holds the lock.
+    /// Locks an existing folder, and completes the result of a process that was killed while its
+    /// files took their places.
     ///
     /// # Errors
-    /// Returns [`io::ErrorKind::WouldBlock`] if another process holds the lock for longer.
-    pub fn take(folder: &Path, patience: Duration) -> io::Result<Self> {
+    /// Returns [`io::ErrorKind::WouldBlock`] if another process holds the lock for more than
+    /// [`MAX_LOCK_WAIT`], and an error if the result cannot be completed.
+    pub fn take(folder: &Path) -> io::Result<Self> {
+        let lock = Self::take_within(folder, MAX_LOCK_WAIT)?;
+        if folder.is_dir() {
+            batch::finish(folder)?;
+        }
+        Ok(lock)
+    }
+
+    fn take_within(folder: &Path, patience: Duration) -> io::Result<Self> {
         // Windows does not open folders as files, and some network folders have no locks.
         let Some(open) = folder.is_dir().then(|| File::open(folder).ok()).flatten() else {
             return Ok(Self { _folder: None });
@@ -49,11 +63,11 @@ mod tests {
     #[test]
     fn a_second_writer_waits_and_is_refused_in_the_end() {
         let folder = tempfile::tempdir().unwrap();
-        let first = FolderLock::take(folder.path(), Duration::ZERO).unwrap();
-        let refused = FolderLock::take(folder.path(), 4 * RETRY_INTERVAL).unwrap_err();
+        let first = FolderLock::take_within(folder.path(), Duration::ZERO).unwrap();
+        let refused = FolderLock::take_within(folder.path(), 4 * RETRY_INTERVAL).unwrap_err();
         assert_eq!(refused.kind(), io::ErrorKind::WouldBlock);
         drop(first);
-        FolderLock::take(folder.path(), Duration::ZERO).unwrap();
+        FolderLock::take_within(folder.path(), Duration::ZERO).unwrap();
         assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none(), "no lock file");
     }
 }

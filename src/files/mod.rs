@@ -1,6 +1,7 @@
-//! Access to files: reads with a size limit, atomic writes, a record of written files, and CSV
-//! text.
+//! Access to files: reads with a size limit, results whose files appear together, a record of
+//! written files, and CSV text.
 
+mod batch;
 mod format;
 mod lock;
 mod record;
@@ -11,13 +12,14 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::Path;
 
+pub use batch::Batch;
 pub(crate) use format::Format;
 pub use format::{FORMAT_VERSION, PROGRAM};
-pub use lock::FolderLock;
-pub use record::{FolderRecord, digest};
+pub use lock::{FolderLock, MAX_LOCK_WAIT};
+pub use record::{FolderRecord, digest, was_changed};
 pub use sealed::Changes;
 pub(crate) use sealed::{DIGEST_KEY, changed_key, sealed};
-pub(crate) use staged::StagedFile;
+pub use staged::write_new;
 
 /// Reads a file of at most `max_bytes` bytes.
 ///
@@ -31,11 +33,13 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 
 /// Opens a file for reading. Returns an error for folders, FIFOs, sockets, devices and files of the
 /// kernel (`/proc`, `/sys`), which could block or never end. The standard input is allowed as
-/// `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`.
+/// `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`. If a process was killed while it wrote results
+/// to the folder of the file, they are completed first.
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened, or is no regular file.
 pub fn open(path: &Path) -> io::Result<File> {
+    complete_results(staged::folder_of(path))?;
     let kind = fs::metadata(path)?.file_type();
     let descriptors = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
     if descriptors.iter().any(|start| path.starts_with(start)) {
@@ -55,7 +59,19 @@ pub fn open(path: &Path) -> io::Result<File> {
     if real.starts_with("/proc") || real.starts_with("/sys") {
         return refused("file of the kernel");
     }
+    complete_results(staged::folder_of(&real))?;
     File::open(path)
+}
+
+/// Completes the results in a folder if the process that wrote them was killed.
+fn complete_results(folder: &Path) -> io::Result<()> {
+    if !batch::is_interrupted(folder) {
+        return Ok(());
+    }
+    FolderLock::take(folder).map(drop).map_err(|error| {
+        let message = format!("a new result is not complete in its folder, and cannot be: {error}");
+        io::Error::new(error.kind(), message)
+    })
 }
 
 /// Reads a text file of any size; see [`open`] for the files that are refused.

@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest as _, Sha256};
 
-use super::{StagedFile, read_limited};
+use super::read_limited;
+use super::staged::folder_of;
 
-/// Name of the record file.
-const RECORD_NAME: &str = ".flexcal";
 /// Maximum size of a record that is read \[bytes\].
 const MAX_RECORD_BYTES: u64 = 1 << 20;
 
@@ -34,13 +33,30 @@ pub fn digest(bytes: &[u8]) -> String {
     hexadecimal(Sha256::digest(bytes).as_slice())
 }
 
+/// Returns true if flexcal wrote the file to its folder, and the file was changed since.
+pub fn was_changed(file: &Path) -> bool {
+    let Some(name) = file.file_name().and_then(|name| name.to_str()) else { return false };
+    let folder = folder_of(file);
+    FolderRecord::read(folder).is_ok_and(|record| {
+        record.names().any(|recorded| recorded == name) && record.writer(folder, name).is_none()
+    })
+}
+
 impl FolderRecord {
+    /// Name of the record file, with which the names of all other files of flexcal's own begin.
+    pub const NAME: &str = ".flexcal";
+
     /// Reads the record of a folder; returns an empty record if there is none.
     ///
     /// # Errors
     /// Returns an error if the record exists and cannot be read.
     pub fn read(folder: &Path) -> io::Result<Self> {
-        let text = match read_limited(&folder.join(RECORD_NAME), MAX_RECORD_BYTES) {
+        Self::read_file(&Self::file(folder))
+    }
+
+    /// Reads the record in a file; returns an empty record if there is none.
+    pub(super) fn read_file(file: &Path) -> io::Result<Self> {
+        let text = match read_limited(file, MAX_RECORD_BYTES) {
             Ok(text) => text,
             Err(error)
                 if matches!(
@@ -78,42 +94,38 @@ impl FolderRecord {
         self.lines.iter().map(|line| line.name.as_str())
     }
 
-    /// Adds a record for `text`, which a command is about to write to the file `name`.
+    /// Records the files `names` of a folder as they are; skips those that are no regular files.
+    pub(super) fn of_files<'a>(folder: &Path, names: impl Iterator<Item = &'a String>) -> Self {
+        let line = |name: &String| {
+            let digest = digest_of_file(&folder.join(name)).ok()?;
+            Some(RecordLine { digest, command: "replaced".to_owned(), name: name.clone() })
+        };
+        Self { lines: names.filter_map(line).collect() }
+    }
+
+    /// Records `text` as the file `name` of a command.
     pub fn add(&mut self, command: &str, name: &str, text: &str) {
+        self.remove(name);
         let (command, name) = (command.to_owned(), name.to_owned());
         self.lines.push(RecordLine { digest: digest(text.as_bytes()), command, name });
     }
 
-    /// Keeps the newest line of each name and removes the names for which `is_gone` returns true.
-    pub fn settle(&mut self, is_gone: impl Fn(&str) -> bool) {
-        let newest: Vec<RecordLine> = self
-            .lines
-            .iter()
-            .enumerate()
-            .filter(|(index, line)| {
-                !is_gone(&line.name)
-                    && self.lines.iter().skip(index + 1).all(|later| later.name != line.name)
-            })
-            .map(|(_, line)| line.clone())
-            .collect();
-        self.lines = newest;
+    /// Removes the file `name` from the record.
+    pub fn remove(&mut self, name: &str) {
+        self.lines.retain(|line| line.name != name);
     }
 
-    /// Writes the record to its folder.
-    ///
-    /// # Errors
-    /// Returns an error if the record cannot be written.
-    pub fn write(&self, folder: &Path) -> io::Result<()> {
+    /// Returns the record as text.
+    pub(super) fn text(&self) -> String {
         let line = |RecordLine { digest, command, name }: &RecordLine| {
             format!("{digest} {command} {name}\n")
         };
-        let lines = self.lines.iter().map(line).collect::<Vec<_>>().concat();
-        StagedFile::new(&Self::file(folder), &lines)?.commit()
+        self.lines.iter().map(line).collect()
     }
 
     /// Returns the path of the record, the file `.flexcal` in a folder.
     pub fn file(folder: &Path) -> PathBuf {
-        folder.join(RECORD_NAME)
+        folder.join(Self::NAME)
     }
 }
 
@@ -150,16 +162,15 @@ mod tests {
         for text in ["one", "two"] {
             record.add("identify", "report of mine.md", text);
             fs::write(path.join("report of mine.md"), text).unwrap();
-            record.write(path).unwrap();
+            fs::write(FolderRecord::file(path), record.text()).unwrap();
         }
         record = FolderRecord::read(path).unwrap();
         assert_eq!(record.writer(path, "report of mine.md"), Some("identify"));
-        record.settle(|_| false);
         assert_eq!(record.names().count(), 1);
         fs::write(path.join("report of mine.md"), "one").unwrap();
         assert_eq!(record.writer(path, "report of mine.md"), None, "the text before the last");
         assert_eq!(record.writer(path, "another"), None);
-        record.settle(|name| name.starts_with("report"));
+        record.remove("report of mine.md");
         assert_eq!(record, FolderRecord::default());
     }
 }

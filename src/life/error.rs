@@ -36,6 +36,11 @@ pub enum PriorError {
     OtherType { file: PathBuf, other: PathBuf, part: String },
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable { file: PathBuf, source: std::io::Error },
+    #[error(
+        "{}: changed since flexcal wrote it; run flexcal fleet again, or move the file to another folder to use it as it is",
+        file.display()
+    )]
+    Changed { file: PathBuf },
     #[error("{}: not a PRIOR.toml of flexcal fleet: {reason}", file.display())]
     Syntax { file: PathBuf, reason: String },
     #[error("{}: {part} is declared differently in the problem; a prior is of arms with the same declaration", file.display())]

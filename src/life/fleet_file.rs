@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::error::PriorError;
 use super::fleet::Fleet;
-use crate::files::read_limited;
+use crate::files::{read_limited, was_changed};
 use crate::problem::digest::with_whole_names;
 
 /// Value of the key `format`.
@@ -85,7 +85,8 @@ impl FleetPrior {
     /// Reads a PRIOR.toml.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read or is no PRIOR.toml.
+    /// Returns an error if the file cannot be read, is no PRIOR.toml, or was changed since flexcal
+    /// wrote it.
     pub fn read(file: &Path) -> Result<Self, PriorError> {
         let syntax = |reason: String| PriorError::Syntax { file: file.to_owned(), reason };
         let bytes = read_limited(file, MAX_FILE_MIB << 20)
@@ -95,6 +96,9 @@ impl FleetPrior {
             toml::from_str(&text).map_err(|error| syntax(error.message().to_owned()))?;
         if format != FORMAT || version > VERSION {
             return Err(syntax(format!("format {format}, version {version}")));
+        }
+        if was_changed(file) {
+            return Err(PriorError::Changed { file: file.to_owned() });
         }
         if let Some((name, _)) = parameters.iter().find(|(_, entry)| !entry.is_usable()) {
             return Err(syntax(format!(

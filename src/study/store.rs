@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::definition::{Cell, Part, Study};
 use super::key::key;
 use super::tally::Tally;
-use crate::files::{Format, PROGRAM, StagedFile, changed_key, read_text, sealed};
+use crate::files::{Format, PROGRAM, changed_key, read_text, sealed, write_new};
 
 /// Number of hexadecimal digits of the key that form the file name of a part.
 const NAME_DIGITS: usize = 16;
@@ -109,10 +109,12 @@ impl Store {
     /// Writes a finished part.
     pub(super) fn keep(&self, finished: &FinishedPart) -> Result<(), StoreError> {
         let path = self.path(&finished.key);
-        let write = || -> io::Result<()> {
-            StagedFile::new(&path, &sealed(&serde_json::to_string_pretty(finished)?))?.commit()
-        };
-        write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })
+        let write = || write_new(&path, &sealed(&serde_json::to_string_pretty(finished)?));
+        match write() {
+            // Another process has finished the same part.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+            done => done.map_err(|source| StoreError::Unwritable { path, source }),
+        }
     }
 
     /// Reads a finished part of the study; `None` if the store does not contain it.

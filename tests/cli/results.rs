@@ -95,6 +95,54 @@ fn runs_into_one_folder_at_once_leave_one_whole_result() {
 }
 
 #[test]
+fn a_result_whose_writer_was_killed_is_completed_by_the_next_command() {
+    let folder = Folder::with_lunar_sampler();
+    folder.flexcal("identify . --quiet --out out").success();
+    folder.flexcal("identify . --quiet --out new --data a-none.csv").success();
+    // The writer was killed after its first file had taken its place.
+    let moved = ["estimate.json", "residuals.csv", "report.md", "report.html", ".flexcal"];
+    fs::create_dir(folder.path("out/.flexcal-new")).unwrap();
+    fs::copy(folder.path("out/.flexcal"), folder.path("out/.flexcal-new/.flexcal-replaced"))
+        .unwrap();
+    for name in moved {
+        let stage = if name == "estimate.json" { "out" } else { "out/.flexcal-new" };
+        fs::copy(folder.path(format!("new/{name}")), folder.path(format!("{stage}/{name}")))
+            .unwrap();
+    }
+    let figures = folder.path("out/.flexcal-new/figures");
+    fs::rename(folder.path("new/figures"), figures).unwrap();
+    let predict = "predict problem.toml --data a-none.csv --estimate out/estimate.json --out p";
+    folder.flexcal(predict).success();
+    assert!(!folder.has("out/.flexcal-new"));
+    for name in moved {
+        assert_eq!(
+            folder.read(format!("out/{name}")),
+            folder.read(format!("new/{name}")),
+            "{name}"
+        );
+    }
+    folder.flexcal("identify . --quiet --out out").success();
+}
+
+#[test]
+fn files_of_a_result_that_were_changed_are_not_believed() {
+    let folder = Folder::with_lunar_sampler();
+    folder.flexcal("identify . --quiet --out out").success();
+    folder.edit("out/residuals.csv", "true", "false");
+    let compare = "compare-results out/estimate.json out/estimate.json --out compared";
+    let run = folder.flexcal(compare).code(2);
+    assert_contains(&run.stderr, &["out/residuals.csv: changed since flexcal wrote it"]);
+    let run = folder.flexcal(&format!("{compare} --trust")).success();
+    assert_contains(&run.stderr, &["residuals.csv: changed", "used all the same"]);
+    // Names of the folder's own records, and a test program that would not end.
+    let export = "export . --estimate out/estimate.json --format";
+    let run = folder.flexcal(&format!("{export} dh --out made/.flexcal")).code(2);
+    assert_contains(&run.stderr, &["for flexcal's own records"]);
+    folder.flexcal(&format!("{export} c --test-poses 10000000000 --out made")).code(2);
+    assert!(!folder.has("made"));
+}
+
+#[test]
 fn an_estimate_that_was_changed_is_refused_or_said() {
     const ESTIMATE: &str = "out/estimate.json";
     let folder = Folder::with_lunar_sampler();
