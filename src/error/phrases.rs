@@ -141,8 +141,7 @@ pub(super) fn behind_camera_remedy(fits: Option<bool>, miss: Option<f64>) -> Str
             "each image by itself fits the marker, so that the points are right; check units \
              (radians under _deg?), signs and order of the joint columns, whether joints and \
              images belong together, whether focal_px and centre_px are of the resolution of the \
-             images, \
-             and at_m and rotation_deg of camera and marker"
+             images, and at_m and rotation_deg of camera and marker"
                 .to_owned()
         }
         Some(false) => format!(

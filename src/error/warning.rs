@@ -57,8 +57,7 @@ pub enum WarningKind {
     #[error(
         "pixels of the camera \"{camera}\" reach {}, {}, but its centre_px is that of images of \
          {} × {} pixels: if its intrinsics were found at another resolution, multiply focal_px and \
-         centre_px by \
-         the ratio of the resolutions",
+         centre_px by the ratio of the resolutions",
         pixel[0], pixel[1], image[0], image[1]
     )]
     OtherResolution { camera: String, pixel: [String; 2], image: [String; 2] },

@@ -1,4 +1,4 @@
-//! Parameters of effects.
+//! Parameters of effects, and parameters inside formulas.
 
 use super::expression::Parsed;
 use super::family::{At, Prior};

@@ -1,4 +1,5 @@
-//! Columns of a joint table that are appended to a table of measured rows.
+//! Columns of a joint table that are appended to a table of measured rows, and the style of the
+//! cells of a table.
 
 use std::path::PathBuf;
 

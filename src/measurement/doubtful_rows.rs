@@ -1,5 +1,6 @@
-//! Warnings about doubtful rows and words of a table: an instrument that held its last value, a
-//! pixel outside its image, and session names that are written in two ways.
+//! Warnings about doubtful rows and words of a table: an instrument that held its last value or
+//! lost its target, a pixel outside its image, intrinsics of another resolution, and session names
+//! that are written in two ways.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +11,7 @@ use crate::problem::{Joint, JointKind, Observation, Problem};
 /// Smallest ratio of the farthest pixel to twice the centre of the image, along both axes, at which
 /// the intrinsics of a camera are those of another resolution. Centres of lenses are nearer to
 /// those of images.
-const MAX_PIXEL_REACH: f64 = 1.2;
+const MIN_PIXEL_REACH: f64 = 1.2;
 /// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
 /// \[m\].
 const MIN_TURN: f64 = std::f64::consts::PI / 180.0;
@@ -92,7 +93,7 @@ impl Measurements {
             let centre = fixture.known.get(place..place + 2).filter(|_| fixture.image.is_none())?;
             let centre = [centre[0]?, centre[1]?];
             let is_beyond =
-                |axis: usize| reach[axis] > MAX_PIXEL_REACH * 2.0 * centre[axis].max(1.0);
+                |axis: usize| reach[axis] > MIN_PIXEL_REACH * 2.0 * centre[axis].max(1.0);
             let kind = WarningKind::OtherResolution {
                 camera: fixture.name.clone(),
                 pixel: reach.map(|value| format!("{value:.0}")),

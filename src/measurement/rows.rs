@@ -315,7 +315,7 @@ impl RowsBuilder {
     }
 }
 
-/// Returns index of a file and line in it as a row keeps them.
+/// Returns the index of a row's file and its line there, as [`Measurements`] stores them.
 pub(super) fn place_of_row(file: usize, line: usize) -> (u32, u32) {
     (narrow(file), narrow(line))
 }

@@ -1,7 +1,8 @@
 //! Work divided among threads.
 //!
-//! Threads are given their work by [`for_each`], which is compiled once. With an iterator of rayon
-//! at each call, the division into threads would be compiled anew for every closure.
+//! Threads are given their work by [`for_each`], [`write_chunks`] and [`write_chunks_from_last`],
+//! which are compiled once. With an iterator of rayon at each call, the division into threads would
+//! be compiled anew for every closure.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -24,7 +25,8 @@ pub(crate) fn map<T: Send>(count: usize, of: impl Fn(usize) -> T + Sync) -> Vec<
     values.into_iter().filter_map(value).collect()
 }
 
-/// Does as [`map`] with a buffer for each call of `of`, which later calls use again. `new` makes one.
+/// Does the same as [`map`], with a buffer for each call of `of` that later calls reuse. `new`
+/// creates one.
 pub(crate) fn map_with<B: Send, T: Send>(
     count: usize,
     new: impl Fn() -> B + Sync,
@@ -75,7 +77,7 @@ pub(crate) fn write_chunks(
     entries.par_chunks_mut(size).enumerate().for_each(|(index, chunk)| write(index, chunk));
 }
 
-/// Does as [`write_chunks`], beginning with the last chunks, which take longest.
+/// Does the same as [`write_chunks`], beginning with the last chunks, which take longest.
 pub(crate) fn write_chunks_from_last(
     entries: &mut [f64],
     size: usize,

@@ -1,4 +1,5 @@
 //! Reader of `joints = { files = […], by = … }`: a second table that holds the joint coordinates.
+//! Also which of two sets of joint columns counts, and paths without detours.
 
 use std::path::{Component, Path, PathBuf};
 

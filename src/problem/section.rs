@@ -1,4 +1,5 @@
-//! Tables of the problem file, read key by key; a key that was not read is an error.
+//! Tables of the problem file, read key by key; a key that was not read is an error, which names
+//! the section where the key belongs.
 
 use std::ops::Range;
 

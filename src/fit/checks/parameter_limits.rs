@@ -182,8 +182,7 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
         is_small.then(|| {
             "arms are built with such deviations, so that the σ of this prior is too small: \
              declare a larger one in [parameters]; then check axes of the measuring frame, signs \
-             of joints, \
-             and units"
+             of joints, and units"
                 .to_owned()
         })
     })

@@ -1,4 +1,4 @@
-//! Formulas read from text.
+//! Formulas read from text, and the words that they may use.
 
 use std::ops::Range;
 

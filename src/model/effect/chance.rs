@@ -1,4 +1,5 @@
-//! Share of a family's prior probability that one of its members has.
+//! Share of a family's prior probability that one of its members has, and prior sizes of
+//! parameters.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;

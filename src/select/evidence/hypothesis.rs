@@ -1,4 +1,4 @@
-//! Hypotheses about the cause of a residual: effects, and functions without a law.
+//! Hypotheses about the cause of a residual: effects and functions without a law, and sets of them.
 
 use std::fmt;
 

@@ -344,8 +344,7 @@ impl Search<'_, '_, '_> {
     }
 
     /// Returns the best laws of all sites that the fit does not contain, those of one site in the
-    /// order of their probability.
-    /// Returns none if the other members of the set cannot be fitted.
+    /// order of their probability. Returns none if the other members of the set cannot be fitted.
     fn best(
         &self,
         sites: &[LawAt],

@@ -1,4 +1,5 @@
-//! Classes of sums whose predictions differ by less than the noise allows to distinguish.
+//! Classes of sums whose predictions differ by less than the noise allows to distinguish, and the
+//! prior probability of laws among all hypotheses.
 
 use nalgebra::DVector;
 

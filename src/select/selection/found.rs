@@ -1,4 +1,5 @@
-//! Claims, tests and alternatives for each effect that the search added.
+//! Claims, tests and alternatives for each effect that the search added, and the effect that
+//! expresses a misread table, with which the search begins.
 
 use std::collections::BTreeMap;
 

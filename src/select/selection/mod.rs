@@ -1,16 +1,15 @@
 //! Loop of model selection: searches the effects that a problem lacks, by the evidence of its fits.
 //!
 //! - `search`: alternates between evaluating the evidence about a fit and fitting the most probable
-//!   set, until both agree.
+//!   set, until both agree; refines searched arguments on all rows.
 //! - `state`: the fits made so far.
 //! - `gears`: the common prior of harmonics.
-//! - `polish`: refines searched arguments on all rows.
-//! - `misread`: begins with the effect that expresses a misread table.
-//! - `plainer`: compares an effect with plainer causes that together do the same.
-//! - `close`: runs the loop from the declared problem to its result.
+//! - `close`: runs the loop from the declared problem to its result, with the gain on held-out
+//!   poses.
 //! - `remainder`: corrects what no sure law explains.
-//! - `found`, `status`, `interval`: the claims about each effect, the verdict, and the gain on
-//!   held-out poses.
+//! - `found`: the effect that expresses a misread table, with which the search begins, and the
+//!   claims about each effect, compared with plainer causes that together do the same.
+//! - `status`: the status of each effect, and the verdict.
 
 mod close;
 mod found;

@@ -24,12 +24,12 @@ pub(super) struct FoundAlone {
 }
 
 impl ClosedLoop {
-    /// Fits a remainder in addition to the effects. No remainder is fitted if the loop was
-    /// interrupted or the table was misread.
+    /// Fits a remainder in addition to the effects, which may replace uncertain ones. No remainder
+    /// is fitted if the loop was interrupted or the table was misread.
     ///
     /// Effects without the status [`Status::Found`] are one of several explanations of an error,
     /// chosen because they fit it best. If there are such effects and a remainder is kept beside
-    /// them, a remainder is also fitted beside the found effects alone. It has the error as a
+    /// them, a remainder is also fitted beside the found effects alone. It describes the error by a
     /// smooth function, whatever its law, and therefore often predicts better. The uncertain
     /// effects then stay only if left-out configurations are predicted better with them by more
     /// than chance. Otherwise they become structure without a law.

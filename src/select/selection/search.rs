@@ -1,5 +1,5 @@
 //! Search loop: evaluates the evidence about a fit and fits the effects of its most probable set,
-//! until the fit contains exactly these effects.
+//! until the fit contains exactly these effects. Refines their searched arguments on all rows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
