@@ -84,22 +84,30 @@ impl Measurements {
         for row in 0..self.len() {
             let Observation::Pixel(camera, ..) = self.observation(row) else { continue };
             let pixel = self.positions.get(row)?;
-            let reach: &mut [f64; 2] = farthest.entry(camera).or_default();
+            // Pixels with negative numbers do not count from a corner of the image.
+            if pixel.x < 0.0 || pixel.y < 0.0 {
+                return None;
+            }
+            let (reach, at): &mut ([f64; 2], usize) = farthest.entry(camera).or_default();
+            if pixel.x > reach[0] {
+                *at = row;
+            }
             *reach = [reach[0].max(pixel.x), reach[1].max(pixel.y)];
         }
-        farthest.into_iter().find_map(|(camera, reach)| {
+        farthest.into_iter().find_map(|(camera, (reach, row))| {
             let fixture = problem.fixtures.get(camera as usize)?;
             let place = fixture.kind.fields().iter().position(|field| *field == "cx")?;
             let centre = fixture.known.get(place..place + 2).filter(|_| fixture.image.is_none())?;
             let centre = [centre[0]?, centre[1]?];
-            let is_beyond =
-                |axis: usize| reach[axis] > MIN_PIXEL_REACH * 2.0 * centre[axis].max(1.0);
+            let is_beyond = |axis: usize| {
+                centre[axis] > 0.0 && reach[axis] > MIN_PIXEL_REACH * 2.0 * centre[axis]
+            };
             let kind = WarningKind::OtherResolution {
                 camera: fixture.name.clone(),
                 pixel: reach.map(|value| format!("{value:.0}")),
                 image: centre.map(|value| format!("{:.0}", 2.0 * value)),
             };
-            (is_beyond(0) && is_beyond(1)).then(|| Warning { location: self.location(0), kind })
+            (is_beyond(0) && is_beyond(1)).then(|| Warning { location: self.location(row), kind })
         })
     }
 

@@ -274,7 +274,7 @@ impl<'m> JacobianWriter<'m> {
         rows.put(last_column, &(reading - pose.measured));
         if let Some(measured) = &pose.orientation {
             let place = OrientedPose { setups, base, target, frame: &frame };
-            write(&mut self.arm, &mut self.points, &place, measured, (block, row + 3));
+            write_orientation(&mut self.arm, &mut self.points, &place, measured, (block, row + 3));
         }
     }
 }
@@ -325,7 +325,7 @@ struct OrientedPose<'a> {
 ///
 /// With eₖ the axes of Rₚ and deₖ their derivatives, Rₚ rotates by ω = ½ Σ eₖ × deₖ, and the
 /// residual r changes by −J⁻¹(r) ω ([`inverse_right_jacobian`]).
-fn write(
+fn write_orientation(
     arm: &mut ArmDerivatives,
     points: &mut Block,
     place: &OrientedPose,

@@ -53,8 +53,11 @@ pub(super) fn contradicted_entry(
 /// other parameters within their priors.
 fn freed_target(fit: &CheckedFit) -> Option<ContradictedEntry> {
     let kind = fit.fitting.measurements.leading();
+    if !kind.is_position() {
+        return None;
+    }
     let declared = fit.problem.tool.target;
-    let (moved, rms) = fit.freed_target().filter(|_| kind.is_position())?;
+    let (moved, rms) = fit.freed_target()?;
     let is_explained = rms <= MAX_REMAINING_FRACTION * (moved - declared).norm();
     is_explained
         .then(|| tool_entry(fit.problem, declared, moved, &format_error(kind.kind(), rms, 2)))

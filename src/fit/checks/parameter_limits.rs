@@ -23,7 +23,7 @@ pub(super) const MAX_PRIOR_SIGMAS: f64 = 5.0;
 const MIN_FURTHER_LENGTHS: usize = 2;
 /// Largest deviation from nominal of an angle \[rad\], or of a length relative to the reach, that
 /// remains after the arm was built and set up: 0.11°, or 2 mm for each metre.
-const MAX_BUILT_DEVIATION: f64 = 2e-3;
+const MAX_BUILT_DEVIATION: f64 = 1e-3;
 /// Usual σ of priors of angles \[°\]. A σ that is in this range if it is read in radians may be meant
 /// so.
 const USUAL_ANGLE_SIGMAS: std::ops::RangeInclusive<f64> = 0.05..=5.0;
@@ -180,8 +180,8 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
             _ => false,
         };
         is_small.then(|| {
-            "arms are built with such deviations, so that the σ of this prior is too small: \
-             declare a larger one in [parameters]; then check axes of the measuring frame, signs \
+            "arms are built with such deviations, so the σ of this prior is probably too small: \
+             declare a larger one in [parameters]; otherwise check axes of the measuring frame, signs \
              of joints, and units"
                 .to_owned()
         })

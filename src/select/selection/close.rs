@@ -192,6 +192,7 @@ pub fn close_by(
             && sure.found.is_trusted()
             && !problem.data.fits_orientation
             && !statuses.contains(&Status::Contradicted)
+            && state.misread.is_none()
     });
     let found_alone = replaceable.map(|sure| {
         Box::new(FoundAlone {

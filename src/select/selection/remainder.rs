@@ -6,12 +6,16 @@ use crate::numeric::Interval;
 use crate::problem::Problem;
 use crate::remainder::{self, Fitted};
 use crate::residual_tests::ResidualTests;
+use crate::select::evidence::Hypothesis;
 use crate::select::harmonic_prior::is_periodic_of_many_orders;
 use crate::select::unexplained::{self, Unexplained};
 
 use super::close::ClosedLoop;
 use super::found::Found;
 use super::status::{Status, Verdict};
+
+/// Largest probability of noise alone beside a law that is probable.
+const MAX_NOISE_PROBABILITY: f64 = 0.5;
 
 /// Fit of the declared problem with the effects of status [`Status::Found`] alone, and its tests.
 #[derive(Debug, Clone)]
@@ -32,7 +36,9 @@ impl ClosedLoop {
     /// them, a remainder is also fitted beside the found effects alone. It describes the error by a
     /// smooth function, whatever its law, and therefore often predicts better. The uncertain
     /// effects then stay only if left-out configurations are predicted better with them by more
-    /// than chance. Otherwise they become structure without a law.
+    /// than chance. Otherwise they become structure without a law. They always stay if the verdict
+    /// is [`Verdict::Explained`], if measured orientations are fitted, if data contradict an effect,
+    /// or if the fit with the found effects alone is not trusted.
     ///
     /// # Errors
     /// Returns an error if `data` are not those of the loop.
@@ -43,6 +49,7 @@ impl ClosedLoop {
         }
         let with_all = remainder::fit(&self.after, &self.closed, data)?;
         let is_kept = |fitted: &&Fitted| fitted.remainder.is_some();
+        let found_alone = found_alone.filter(|_| self.verdict != Verdict::Explained);
         let (Some(kept), Some(alone)) = (with_all.as_ref().filter(is_kept), found_alone) else {
             return Ok((self, with_all));
         };
@@ -55,13 +62,24 @@ impl ClosedLoop {
 
     /// Returns the result with the found effects alone; the other ones become structure without a
     /// law.
-    fn with_found_alone(mut self, alone: FoundAlone) -> Self {
+    fn with_found_alone(self, alone: FoundAlone) -> Self {
         let FoundAlone { mut found, problem, residual_tests, gain } = alone;
-        let (effects, others): (Vec<Found>, Vec<Found>) =
+        let (mut effects, others): (Vec<Found>, Vec<Found>) =
             self.effects.into_iter().partition(|found| found.status == Status::Found);
-        self.unexplained.extend(others.into_iter().filter_map(structure));
-        if self.unexplained.is_empty() {
-            self.unexplained.extend(unexplained::unlocated(&residual_tests));
+        for effect in &mut effects {
+            for estimate in &mut effect.estimates {
+                let refitted = found.estimates.iter().find(|other| other.name == estimate.name);
+                *estimate = refitted.cloned().unwrap_or_else(|| estimate.clone());
+            }
+            effect.held_out_after = found.fitted.held_out;
+        }
+        let mut unexplained = self.unexplained;
+        unexplained.retain(|left| left.site.is_some());
+        unexplained.extend(others.into_iter().filter_map(|found| structure(found, &self.closed)));
+        let place = |left: &Unexplained| left.claims.as_ref().map_or(0.0, |of| of.place.1);
+        unexplained.sort_by(|a, b| place(b).total_cmp(&place(a)));
+        if unexplained.is_empty() {
+            unexplained.extend(unexplained::unlocated(&residual_tests));
         }
         found.findings.iter_mut().for_each(Finding::set_remedy_after_loop);
         let has_gear = effects.iter().any(|found| is_periodic_of_many_orders(&found.effect));
@@ -70,6 +88,7 @@ impl ClosedLoop {
             after: found,
             closed: problem,
             effects,
+            unexplained,
             residual_tests,
             gain,
             harmonic_prior: self.harmonic_prior.filter(|_| has_gear),
@@ -78,15 +97,23 @@ impl ClosedLoop {
     }
 }
 
-/// Returns the structure that an effect without a sure law leaves if it is not used; `None` without
-/// claims about it.
-fn structure(found: Found) -> Option<Unexplained> {
-    let claims = found.claims?;
-    Some(Unexplained {
-        site: Some(claims.place.0),
-        depends_on: claims.depends_on.0.clone(),
-        p_value: found.p_value,
-        claims: Some(claims),
+/// Returns the structure that an effect of `problem` leaves if it is not used; `None` if neither
+/// claims nor its p-value say that there is any.
+fn structure(found: Found, problem: &Problem) -> Option<Unexplained> {
+    let hypothesis = Hypothesis::of_effect(&found.effect, problem, (false, false));
+    // A probable law is more probable than noise.
+    let limit = if found.status == Status::Probable { MAX_NOISE_PROBABILITY } else { 1.0 };
+    let p_value = found.p_value.min(limit);
+    let is_seen = found.claims.is_some() || p_value <= MAX_NOISE_PROBABILITY;
+    let (site, depends_on) = match &found.claims {
+        Some(claims) => (claims.place.0, claims.depends_on.0.clone()),
+        None => (hypothesis.site, hypothesis.depends_on),
+    };
+    is_seen.then_some(Unexplained {
+        site: Some(site),
+        depends_on,
+        p_value,
+        claims: found.claims,
         correction: None,
     })
 }

@@ -296,7 +296,21 @@ fn of_exchanged_lengths(problem: &Problem) -> Vec<Misreading> {
             })
         })
     });
-    pairs.filter(|pair| pair.rewritten(problem).is_some()).collect()
+    // A standard sheet declares neither a of the first joint nor d of the flange after its last row.
+    let is_declared = |(joint, field): (usize, JointField)| match problem.standard_rows() {
+        None => true,
+        Some(rows) => match field {
+            JointField::A => joint > 1,
+            _ => joint <= rows.len(),
+        },
+    };
+    let are_declared = |pair: &Misreading| match *pair {
+        Misreading::ExchangedLengths { joint, field, with, other } => {
+            is_declared((joint, field)) && is_declared((with, other))
+        }
+        _ => true,
+    };
+    pairs.filter(|pair| are_declared(pair) && pair.rewritten(problem).is_some()).collect()
 }
 
 /// Returns misreadings of masses and payloads by each of `scales`.

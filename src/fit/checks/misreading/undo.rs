@@ -350,8 +350,13 @@ impl Misreading {
     /// Corrects the order of positions in `rows`, the `chosen` ones of `table`.
     fn undo_order(self, rows: &mut Measurements, table: &Measurements, chosen: &[usize]) {
         if self == Self::ReversedRows {
-            rows.positions =
-                chosen.iter().map(|&row| table.positions[table.len() - 1 - row]).collect();
+            let of_arm: Vec<usize> =
+                (0..table.len()).filter(|&row| table.observation(row).is_of_arm()).collect();
+            let opposite = |row: &usize| match of_arm.binary_search(row) {
+                Ok(place) => table.positions[of_arm[of_arm.len() - 1 - place]],
+                Err(_) => table.positions[*row],
+            };
+            rows.positions = chosen.iter().map(opposite).collect();
         }
         let Self::TextOrder { first, is_of_joints } = self else { return };
         let numbers = text_order(table.len(), first);
