@@ -5,8 +5,10 @@ use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+use super::lock::{FolderLock, MAX_LOCK_WAIT};
+use super::record::FolderRecord;
+use super::regular;
 use super::staged::{StagedFile, folder_of, sync_folder};
-use super::{FolderLock, FolderRecord, open};
 
 /// Subfolder of the results that holds the complete files of a new result.
 ///
@@ -80,7 +82,7 @@ impl Batch {
         // A file system frees the blocks of a replaced file within the rename, which may take
         // milliseconds, unless the file is open.
         let names = replaced.names().chain([FolderRecord::NAME]);
-        let open_files: Vec<_> = names.map(|name| open(&folder.join(name))).collect();
+        let open_files: Vec<_> = names.map(|name| regular::open(&folder.join(name))).collect();
         fs::rename(stage.path(), folder.join(STAGE))?;
         // The rename has already removed this name.
         _ = stage.keep();
@@ -91,8 +93,45 @@ impl Batch {
     }
 }
 
+impl FolderLock {
+    /// Locks an existing folder, and completes the result of a process that was killed while its
+    /// files took their places.
+    ///
+    /// # Errors
+    /// Returns [`io::ErrorKind::WouldBlock`] if another process holds the lock for more than
+    /// [`MAX_LOCK_WAIT`], and an error if the result cannot be completed.
+    pub fn take(folder: &Path) -> io::Result<Self> {
+        let lock = Self::take_within(folder, MAX_LOCK_WAIT)?;
+        if folder.is_dir() {
+            finish(folder)?;
+        }
+        Ok(lock)
+    }
+}
+
+/// Completes the results in the folder of a file, and in that to which it is a link, if the process
+/// that wrote them was killed.
+///
+/// # Errors
+/// Returns an error if they cannot be completed.
+pub(super) fn complete_beside(file: &Path) -> io::Result<()> {
+    complete(folder_of(file))?;
+    file.canonicalize().map_or(Ok(()), |real| complete(folder_of(&real)))
+}
+
+/// Completes the results in a folder if the process that wrote them was killed.
+fn complete(folder: &Path) -> io::Result<()> {
+    if !is_interrupted(folder) {
+        return Ok(());
+    }
+    FolderLock::take(folder).map(drop).map_err(|error| {
+        let message = format!("a new result is not complete in its folder, and cannot be: {error}");
+        io::Error::new(error.kind(), message)
+    })
+}
+
 /// Returns true if a complete stage is in the folder.
-pub(super) fn is_interrupted(folder: &Path) -> bool {
+fn is_interrupted(folder: &Path) -> bool {
     folder.join(STAGE).symlink_metadata().is_ok_and(|stage| stage.is_dir())
 }
 
@@ -101,7 +140,7 @@ pub(super) fn is_interrupted(folder: &Path) -> bool {
 ///
 /// # Errors
 /// Returns an error if a file cannot be moved.
-pub(super) fn finish(folder: &Path) -> io::Result<()> {
+fn finish(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)?.flatten() {
         let is_incomplete = |name: &str| name.starts_with(INCOMPLETE_STAGE);
         if entry.file_name().to_str().is_some_and(is_incomplete) {
@@ -195,7 +234,12 @@ fn builder() -> tempfile::Builder<'static, 'static> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::read_text;
+
+    /// Reads a file as commands do.
+    fn read_text(file: &Path) -> io::Result<String> {
+        complete_beside(file)?;
+        fs::read_to_string(file)
+    }
 
     /// Writes files of a result to a folder.
     fn write(folder: &Path, texts: &[(&str, &str)], outdated: &[&str]) {

@@ -6,8 +6,6 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use super::batch;
-
 /// Maximum time for which a process waits while another one writes to the same folder.
 pub const MAX_LOCK_WAIT: Duration = Duration::from_secs(10);
 /// Pause between two attempts to take a lock.
@@ -23,21 +21,11 @@ pub struct FolderLock {
 }
 
 impl FolderLock {
-    /// Locks an existing folder, and completes the result of a process that was killed while its
-    /// files took their places.
+    /// Locks an existing folder, within `patience`.
     ///
     /// # Errors
-    /// Returns [`io::ErrorKind::WouldBlock`] if another process holds the lock for more than
-    /// [`MAX_LOCK_WAIT`], and an error if the result cannot be completed.
-    pub fn take(folder: &Path) -> io::Result<Self> {
-        let lock = Self::take_within(folder, MAX_LOCK_WAIT)?;
-        if folder.is_dir() {
-            batch::finish(folder)?;
-        }
-        Ok(lock)
-    }
-
-    fn take_within(folder: &Path, patience: Duration) -> io::Result<Self> {
+    /// Returns [`io::ErrorKind::WouldBlock`] if another process holds the lock for longer.
+    pub(super) fn take_within(folder: &Path, patience: Duration) -> io::Result<Self> {
         // Windows does not open folders as files, and some network folders have no locks.
         let Some(open) = folder.is_dir().then(|| File::open(folder).ok()).flatten() else {
             return Ok(Self { _folder: None });

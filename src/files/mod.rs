@@ -5,11 +5,12 @@ mod batch;
 mod format;
 mod lock;
 mod record;
+mod regular;
 mod sealed;
 mod staged;
 
-use std::fs::{self, File};
-use std::io::{self, Read as _};
+use std::fs::File;
+use std::io;
 use std::path::Path;
 
 pub use batch::Batch;
@@ -21,14 +22,13 @@ pub use sealed::Changes;
 pub(crate) use sealed::{DIGEST_KEY, changed_key, sealed};
 pub use staged::write_new;
 
-/// Reads a file of at most `max_bytes` bytes.
+/// Reads a file of at most `max_bytes` bytes; see [`open`] for the files that are refused.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, or is larger ([`io::ErrorKind::FileTooLarge`]).
 pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > max_bytes { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
+    batch::complete_beside(path)?;
+    regular::read_limited(path, max_bytes)
 }
 
 /// Opens a file for reading. Returns an error for folders, FIFOs, sockets, devices and files of the
@@ -39,39 +39,8 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 /// # Errors
 /// Returns an error if the file cannot be opened, or is no regular file.
 pub fn open(path: &Path) -> io::Result<File> {
-    complete_results(staged::folder_of(path))?;
-    let kind = fs::metadata(path)?.file_type();
-    let descriptors = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
-    if descriptors.iter().any(|start| path.starts_with(start)) {
-        return File::open(path);
-    }
-    let refused = |what: &str| {
-        let message = format!("it is a {what}; give a regular file");
-        Err(io::Error::new(io::ErrorKind::InvalidInput, message))
-    };
-    if kind.is_dir() {
-        return refused("folder");
-    }
-    if !kind.is_file() {
-        return refused("FIFO, socket or device");
-    }
-    let real = path.canonicalize()?;
-    if real.starts_with("/proc") || real.starts_with("/sys") {
-        return refused("file of the kernel");
-    }
-    complete_results(staged::folder_of(&real))?;
-    File::open(path)
-}
-
-/// Completes the results in a folder if the process that wrote them was killed.
-fn complete_results(folder: &Path) -> io::Result<()> {
-    if !batch::is_interrupted(folder) {
-        return Ok(());
-    }
-    FolderLock::take(folder).map(drop).map_err(|error| {
-        let message = format!("a new result is not complete in its folder, and cannot be: {error}");
-        io::Error::new(error.kind(), message)
-    })
+    batch::complete_beside(path)?;
+    regular::open(path)
 }
 
 /// Reads a text file of any size; see [`open`] for the files that are refused.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest as _, Sha256};
 
-use super::read_limited;
+use super::regular::read_limited;
 use super::staged::folder_of;
 
 /// Maximum size of a record that is read \[bytes\].

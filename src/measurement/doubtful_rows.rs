@@ -89,25 +89,32 @@ impl Measurements {
                 return None;
             }
             let (reach, at): &mut ([f64; 2], usize) = farthest.entry(camera).or_default();
-            if pixel.x > reach[0] {
+            let [x, y] = reach;
+            if pixel.x > *x {
                 *at = row;
             }
-            *reach = [reach[0].max(pixel.x), reach[1].max(pixel.y)];
+            (*x, *y) = (x.max(pixel.x), y.max(pixel.y));
         }
         farthest.into_iter().find_map(|(camera, (reach, row))| {
             let fixture = problem.fixtures.get(camera as usize)?;
             let place = fixture.kind.fields().iter().position(|field| *field == "cx")?;
             let centre = fixture.known.get(place..place + 2).filter(|_| fixture.image.is_none())?;
-            let centre = [centre[0]?, centre[1]?];
-            let is_beyond = |axis: usize| {
-                centre[axis] > 0.0 && reach[axis] > MIN_PIXEL_REACH * 2.0 * centre[axis]
+            let centre = [*centre.first()?, *centre.get(1)?];
+            let [Some(cx), Some(cy)] = centre else { return None };
+            let centre = [cx, cy];
+            let is_beyond = |(centre, reach): (&f64, &f64)| {
+                *centre > 0.0 && *reach > MIN_PIXEL_REACH * 2.0 * centre
             };
             let kind = WarningKind::OtherResolution {
                 camera: fixture.name.clone(),
                 pixel: reach.map(|value| format!("{value:.0}")),
                 image: centre.map(|value| format!("{:.0}", 2.0 * value)),
             };
-            (is_beyond(0) && is_beyond(1)).then(|| Warning { location: self.location(row), kind })
+            centre
+                .iter()
+                .zip(&reach)
+                .all(is_beyond)
+                .then(|| Warning { location: self.location(row), kind })
         })
     }
 
@@ -122,7 +129,7 @@ impl Measurements {
         }
         let is_moving = |joint: &usize| {
             let declared = problem.joints.get(*joint);
-            declared.is_some_and(|joint| joint.takes_command())
+            declared.is_some_and(Joint::takes_command)
         };
         let mut moving: Vec<usize> = (0..self.joints).filter(is_moving).collect();
         moving.pop();

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
-use crate::problem::Problem;
+use crate::problem::{Joint, Problem};
 use crate::quantity::format::{decimals, number};
 
 /// Largest excess over a joint limit that counts as rounding \[rad\] or \[m\].
@@ -199,7 +199,7 @@ impl Measurements {
     pub(super) fn many_turns(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "rad"
-                && problem.joints.get(column.joint).is_some_and(|joint| joint.takes_angle())
+                && problem.joints.get(column.joint).is_some_and(Joint::takes_angle)
         };
         let value =
             |row: usize, joint: usize| self.configuration(row).get(joint).copied().unwrap_or(0.0);

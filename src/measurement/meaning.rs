@@ -87,9 +87,8 @@ impl Numbering {
             return plain(role);
         }
         if let Some(number) = numbered(name, "approach") {
-            let moves = |&joint: &usize| {
-                problem.joints.get(joint).is_some_and(|joint| joint.takes_command())
-            };
+            let moves =
+                |&joint: &usize| problem.joints.get(joint).is_some_and(Joint::takes_command);
             return match self.joint(number).filter(moves) {
                 Some(joint) => plain(Role::Approach(joint)),
                 None => Ok(Meaning::Ignored(joint_ignored(problem, number))),
@@ -292,7 +291,7 @@ fn numbered(name: &str, prefix: &str) -> Option<usize> {
 
 /// Returns the warning that the column of a joint, counted from 1, is ignored because it is fixed.
 fn joint_ignored(problem: &Problem, joint: usize) -> WarningKind {
-    let moves = |joint: &usize| problem.joints.get(joint - 1).is_some_and(|of| of.takes_command());
+    let moves = |joint: &usize| problem.joints.get(joint - 1).is_some_and(Joint::takes_command);
     // In standard form, the last joint is the flange, which no [[joint]] declares.
     let declared = problem.joints.len() - usize::from(problem.standard_rows().is_some());
     WarningKind::JointIgnored { joint, declared, moving: (1..=declared).filter(moves).collect() }

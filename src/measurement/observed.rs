@@ -266,7 +266,7 @@ pub(super) fn add_known_distances(
             match problem.sigma_of(observation) {
                 Some(sigma) => {
                     let columns = measurements.sigma.iter_mut();
-                    columns.flat_map(|column| column.get_mut(row)).for_each(|of| *of = sigma);
+                    columns.filter_map(|column| column.get_mut(row)).for_each(|of| *of = sigma);
                 }
                 None => without = without.or(Some(observation)),
             }

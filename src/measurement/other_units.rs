@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::Measurements;
 use super::limits::Commands;
 use crate::error::{Location, Warning, WarningKind};
-use crate::problem::{Observation, Problem};
+use crate::problem::{Joint, Observation, Problem};
 
 /// Range of room temperatures, 15 °C to 35 °C, in degrees Fahrenheit.
 const ROOM_FAHRENHEIT: std::ops::RangeInclusive<f64> = 59.0..=95.0;
@@ -149,7 +149,7 @@ impl Measurements {
     pub(super) fn few_degrees(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "deg"
-                && problem.joints.get(column.joint).is_some_and(|joint| joint.takes_angle())
+                && problem.joints.get(column.joint).is_some_and(Joint::takes_angle)
         };
         let is_wide = |column: &Commands| {
             let range = problem.joints.get(column.joint).map(|joint| joint.limits);

@@ -149,7 +149,7 @@ impl<'a> Data<'a> {
             },
             approach: measurements.approach.is_some(),
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
-            payload: payload.map_or([problem.tool.payload_mass; 2].into(), |masses| range(masses)),
+            payload: payload.map_or([problem.tool.payload_mass; 2].into(), range),
             ranges: (0..n).map(column).collect(),
             covariates: self.declared_covariates().map(varies).collect(),
             times: self.shift_times(),

@@ -329,8 +329,13 @@ fn what_may_have_been_misread_is_said() {
         data.measurements.position_unit = Some(1.0);
     });
     assert!(!metres.contains(&Misreading::Metres.to_string()), "{metres:?}");
+    let backwards = with(&|_, data| data.measurements.positions.reverse());
+    assert_eq!(backwards, [Misreading::ReversedRows.to_string()]);
     // No misreading explains shuffled rows.
-    let shuffled = with(&|_, data| data.measurements.positions.reverse());
+    let shuffled = with(&|_, data| {
+        let positions = &data.measurements.positions;
+        data.measurements.positions = (0..90).map(|row| positions[(row * 37 + 11) % 90]).collect();
+    });
     assert!(shuffled.is_empty(), "{shuffled:?}");
     let shifted = with(&|_, data| data.measurements.positions.rotate_left(1));
     assert_eq!(shifted, [Misreading::Shifted { by: -1, from: 0 }.to_string()]);

@@ -207,8 +207,8 @@ impl Effect {
         let joint = || problem.joints.get(self.joint()?.checked_sub(1)?);
         let is = |is_it: fn(&Joint) -> bool| joint().is_some_and(is_it);
         match only {
-            Only::Turning => is(|joint| joint.takes_angle()),
-            Only::Commanded => is(|joint| joint.takes_command()),
+            Only::Turning => is(Joint::takes_angle),
+            Only::Commanded => is(Joint::takes_command),
             Only::RigidJoint => is(|joint| joint.stiffness.is_none()),
             Only::Link => is(|joint| joint.a != 0.0),
             Only::RigidLink => is(|joint| {

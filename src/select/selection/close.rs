@@ -7,7 +7,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::found::{Found, found, with_misread_effect};
-use super::remainder::FoundAlone;
 use super::search::search;
 use super::state::{Round, SearchState};
 use super::status::{Status, Verdict};
@@ -69,6 +68,24 @@ pub struct ClosedLoop {
     /// Fit with the effects of status [`Status::Found`] alone, if there are others and a remainder
     /// may replace these.
     pub(super) found_alone: Option<Box<FoundAlone>>,
+}
+
+/// Fit of the declared problem with the effects of status [`Status::Found`] alone, and its tests.
+#[derive(Debug, Clone)]
+pub(super) struct FoundAlone {
+    pub found: Identification,
+    pub problem: Problem,
+    pub residual_tests: ResidualTests,
+    /// Reduction of the error on held-out rows, as [`ClosedLoop::gain`] is.
+    pub gain: Interval,
+}
+
+impl FoundAlone {
+    fn new(sure: &Fitted, data: &Data, gain: Interval) -> Box<Self> {
+        let residual_tests = check_fit(sure, data);
+        let (found, problem) = (sure.found.clone(), sure.problem.clone());
+        Box::new(Self { found, problem, residual_tests, gain })
+    }
 }
 
 impl ClosedLoop {
@@ -194,14 +211,7 @@ pub fn close_by(
             && !statuses.contains(&Status::Contradicted)
             && state.misread.is_none()
     });
-    let found_alone = replaceable.map(|sure| {
-        Box::new(FoundAlone {
-            residual_tests: check_fit(sure, &data),
-            gain: gain_of(sure),
-            found: sure.found.clone(),
-            problem: sure.problem.clone(),
-        })
-    });
+    let found_alone = replaceable.map(|sure| FoundAlone::new(sure, &data, gain_of(sure)));
     let with_found = with_found.map_or(fitted.found.fitted, |sure| sure.found.fitted);
     let rows = data.evidence_rows();
     let supporting_alone =

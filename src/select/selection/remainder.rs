@@ -1,31 +1,19 @@
 //! Remainder in addition to the effects that the loop found.
 
-use crate::fit::{Finding, FindingCode, Identification, IdentifyError};
+use crate::fit::{Finding, FindingCode, IdentifyError};
 use crate::measurement::Dataset;
-use crate::numeric::Interval;
 use crate::problem::Problem;
 use crate::remainder::{self, Fitted};
-use crate::residual_tests::ResidualTests;
 use crate::select::evidence::Hypothesis;
 use crate::select::harmonic_prior::is_periodic_of_many_orders;
 use crate::select::unexplained::{self, Unexplained};
 
-use super::close::ClosedLoop;
+use super::close::{ClosedLoop, FoundAlone};
 use super::found::Found;
 use super::status::{Status, Verdict};
 
 /// Largest probability of noise alone beside a law that is probable.
 const MAX_NOISE_PROBABILITY: f64 = 0.5;
-
-/// Fit of the declared problem with the effects of status [`Status::Found`] alone, and its tests.
-#[derive(Debug, Clone)]
-pub(super) struct FoundAlone {
-    pub found: Identification,
-    pub problem: Problem,
-    pub residual_tests: ResidualTests,
-    /// Reduction of the error on held-out rows, as [`ClosedLoop::gain`] is.
-    pub gain: Interval,
-}
 
 impl ClosedLoop {
     /// Fits a remainder in addition to the effects, which may replace uncertain ones. No remainder

@@ -1,0 +1,42 @@
+//! Reads of regular files alone, which neither block nor never end.
+
+use std::fs::{self, File};
+use std::io::{self, Read as _};
+use std::path::Path;
+
+/// Opens a file for reading; see [`open`](super::open) for the files that are refused.
+///
+/// # Errors
+/// Returns an error if the file cannot be opened, or is no regular file.
+pub(super) fn open(path: &Path) -> io::Result<File> {
+    let kind = fs::metadata(path)?.file_type();
+    let descriptors = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
+    if descriptors.iter().any(|start| path.starts_with(start)) {
+        return File::open(path);
+    }
+    let refused = |what: &str| {
+        let message = format!("it is a {what}; give a regular file");
+        Err(io::Error::new(io::ErrorKind::InvalidInput, message))
+    };
+    if kind.is_dir() {
+        return refused("folder");
+    }
+    if !kind.is_file() {
+        return refused("FIFO, socket or device");
+    }
+    let real = path.canonicalize()?;
+    if real.starts_with("/proc") || real.starts_with("/sys") {
+        return refused("file of the kernel");
+    }
+    File::open(path)
+}
+
+/// Reads a file of at most `max_bytes` bytes.
+///
+/// # Errors
+/// Returns an error if the file cannot be read, or is larger ([`io::ErrorKind::FileTooLarge`]).
+pub(super) fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
+}
