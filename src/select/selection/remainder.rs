@@ -30,6 +30,7 @@ impl ClosedLoop {
     ///
     /// # Errors
     /// Returns an error if `data` are not those of the loop.
+    #[doc(hidden)]
     pub fn corrected(mut self, data: &Dataset) -> Result<(Self, Option<Fitted>), IdentifyError> {
         let found_alone = self.found_alone.take();
         if self.interrupted || self.after.has(FindingCode::Misread) {
