@@ -98,9 +98,8 @@ impl Measurements {
         farthest.into_iter().find_map(|(camera, (reach, row))| {
             let fixture = problem.fixtures.get(camera as usize)?;
             let place = fixture.kind.fields().iter().position(|field| *field == "cx")?;
-            let centre = fixture.known.get(place..place + 2).filter(|_| fixture.image.is_none())?;
-            let centre = [*centre.first()?, *centre.get(1)?];
-            let [Some(cx), Some(cy)] = centre else { return None };
+            let known = fixture.known.get(place..place + 2).filter(|_| fixture.image.is_none());
+            let &[Some(cx), Some(cy)] = known? else { return None };
             let centre = [cx, cy];
             let is_beyond = |(centre, reach): (&f64, &f64)| {
                 *centre > 0.0 && *reach > MIN_PIXEL_REACH * 2.0 * centre

@@ -18,3 +18,4 @@ mod masses;
 mod screening;
 mod selection_rules;
 mod stopped;
+mod unsure;

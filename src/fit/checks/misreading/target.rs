@@ -13,8 +13,8 @@ impl CheckedFit<'_> {
     /// and the rms residual of that fit \[m\].
     ///
     /// `None` for a problem with several targets, if the target stays within its declared prior, or
-    /// if another parameter of that fit deviates far beyond its prior. With its prior, a target that is declared far off deviates together with
-    /// all parameters that act alike.
+    /// if another parameter of that fit deviates far beyond its prior. With its prior, a target that
+    /// is declared far off deviates together with all parameters that act alike.
     pub fn freed_target(&self) -> Option<(Vector3<f64>, f64)> {
         if !self.has_further_fits || !self.problem.targets.is_empty() {
             return None;
