@@ -207,6 +207,7 @@ pub fn close_by(
     let replaceable = with_found.as_ref().filter(|sure| {
         !sure.found.provisional
             && sure.found.is_trusted()
+            && fitted.found.describes_arm()
             && !problem.data.fits_orientation
             && !statuses.contains(&Status::Contradicted)
             && state.misread.is_none()
