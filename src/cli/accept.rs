@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let of_rows = held_out.iter().zip(&errors).enumerate();
         let test = bounds
             .test(&data.measurements, of_rows.map(|(pose, (&row, &length))| (pose, row, length)));
-        let covered = (bounds.coverage(errors), rows, test);
+        let covered = (bounds.coverage(errors.into_iter().enumerate()), rows, test);
         result = result.with_bounds(&bounds, covered, has_remainder);
     }
     common.warn_if_tiny(arguments.tolerance_mm);

@@ -8,7 +8,7 @@ use flexcal::fit::{self, Residual};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::{HeldOut, Problem};
-use flexcal::remainder::{self, Bounds, CorrectedPrediction};
+use flexcal::remainder::{self, Bounds, Compared, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
 
@@ -109,20 +109,23 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
     let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
-    let lengths = residuals.iter().enumerate().map(|(row, of)| (row, row, of.position.norm()));
-    let of_others = lengths.filter(|(row, ..)| fitted.binary_search(row).is_err());
+    let lengths = residuals.iter().enumerate().map(|(row, of)| (row, of.position.norm()));
+    let lengths = lengths.filter(|(row, _)| rows.observation(*row).is_of_position());
+    let lengths: Vec<(usize, f64)> = lengths.collect();
+    let of_others = lengths.iter().filter(|(row, _)| fitted.binary_search(row).is_err());
+    let of_others = of_others.map(|&(row, length)| (row, row, length));
     let test = bounds.map(|bounds| bounds.test(&rows, of_others)).filter(|test| test.of > 0);
-    let tested = bounds.map(|bounds| (bounds, test.as_ref()));
+    let compared = bounds.map(|bounds| Compared { bounds, errors: &lengths, test: test.as_ref() });
     let errors = prediction.errors.as_ref().map(|errors_of_rows| {
         let errors = PredictionErrors::new(errors_of_rows, &prediction.spreads);
-        match tested {
-            Some(tested) => errors.with_bounds(residuals, tested).to_json(),
+        match compared {
+            Some(compared) => errors.with_bounds(compared).to_json(),
             None => errors.to_json(),
         }
     });
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
-    let story = report::prediction(&problem, arm, &prediction, (tested, &fitted));
+    let story = report::prediction(&problem, arm, &prediction, (compared, &fitted));
     texts.push((RESULT_FILES[3], story.page()));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();

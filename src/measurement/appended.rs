@@ -1,10 +1,10 @@
-//! Columns of a joint table that are appended to a table of measured rows, and the style of the
-//! cells of a table.
+//! Columns of a joint table that are appended to a table of measured rows.
 
 use std::path::PathBuf;
 
 use csv::ByteRecord;
 
+use super::cell_style::CellStyle;
 use super::time::DateOrder;
 
 /// Columns of a joint table that are appended to the columns of a table.
@@ -34,12 +34,4 @@ pub(super) struct JointRow {
     /// Line of the row, from 1.
     pub line: usize,
     pub cells: ByteRecord,
-}
-
-/// Separator of the cells of a table, and decimal mark of its numbers.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CellStyle {
-    pub delimiter: char,
-    /// True if numbers have a decimal comma, false for a decimal point.
-    pub decimal_comma: bool,
 }

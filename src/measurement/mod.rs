@@ -9,6 +9,7 @@ mod appended;
 #[deny(clippy::indexing_slicing)]
 mod beginning;
 mod builder;
+mod cell_style;
 mod cell_words;
 mod clocks;
 #[deny(clippy::indexing_slicing)]

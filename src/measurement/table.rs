@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
-use super::appended::{Appended, CellStyle};
+use super::appended::Appended;
 use super::beginning::Beginning;
+use super::cell_style::CellStyle;
 use super::cell_words::{UNITS, has_thousands, is_spreadsheet_date, other_notation, unit_behind};
 use super::cut_end::LastCells;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};

@@ -200,6 +200,12 @@ impl Observation {
         self == Self::Position
     }
 
+    /// Returns true if the row measures a position of the target: in the measuring frame, or as the
+    /// contact with a point.
+    pub fn is_of_position(self) -> bool {
+        self.is_position() || self.is_point()
+    }
+
     /// Returns true if the target touches a point. Its residual is resolved in the axes of the
     /// arm's base, so that it does not depend on the pose of arm and point together.
     pub fn is_point(self) -> bool {

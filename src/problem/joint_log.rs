@@ -1,9 +1,10 @@
 //! Reader of `joints = { files = […], by = … }`: a second table that holds the joint coordinates.
-//! Also which of two sets of joint columns counts, and paths without detours.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use super::item::Item;
+use super::joint_source::JointSource;
+use super::path::without_detours;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
@@ -68,32 +69,4 @@ pub(super) fn read(
     let source = section.word("source", &JointSource::WORDS, &JointSource::EACH)?;
     section.finish()?;
     Ok((JointLog { files, by, location: item.location() }, source))
-}
-
-worded! {
-    /// Source of the configurations if a table has both commands and readings.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-    pub enum JointSource: as_str {
-        /// Commanded joint coordinates: columns `q1_deg` …
-        #[default]
-        Commanded = "commanded";
-        /// Encoder readings: columns `q1_read_deg` …
-        Read = "read";
-    }
-}
-
-/// Returns a path without folders that a following `..` leaves again, if the shorter path leads to
-/// the same file.
-pub(super) fn without_detours(path: PathBuf) -> PathBuf {
-    let mut short = PathBuf::new();
-    for component in path.components() {
-        match (component, short.components().next_back()) {
-            (Component::ParentDir, Some(Component::Normal(_))) => {
-                short.pop();
-            }
-            _ => short.push(component),
-        }
-    }
-    let is_same = || Some(short.canonicalize().ok()? == path.canonicalize().ok()?);
-    if short != path && is_same() == Some(true) { short } else { path }
 }

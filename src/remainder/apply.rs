@@ -5,14 +5,14 @@ use nalgebra::{DVector, Vector3};
 
 use super::correction::{CorrectedPose, Correction};
 use super::linearise::timed_poses;
-use super::residuals::in_measuring_frame;
+use super::residuals::{in_measuring_frame, of_positions};
 use crate::fit::{
     self, Command, Identification, IdentifyError, Placement, PredictError, Prediction,
     SavedEstimate, StageError,
 };
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
-use crate::problem::Problem;
+use crate::problem::{Observation, Problem};
 
 /// Largest change of a target's correction \[m\] from one pass to the next at which the commands
 /// have converged; far below the accuracy of any arm.
@@ -61,6 +61,12 @@ pub fn predict(
     let all_rows: Vec<usize> = (0..rows.len()).collect();
     let mut poses = placement.poses(rows, &all_rows, correction.sigma);
     estimate.count_time_in(&placement, &mut poses);
+    // Every row of the arm has the uncertainty of a position, whatever it measures.
+    for pose in poses.iter_mut().filter(|pose| pose.observation.is_of_arm()) {
+        if !pose.observation.is_of_position() {
+            (pose.observation, pose.sigma) = (Observation::Position, correction.sigma);
+        }
+    }
     let is_placed = |k: &usize| prediction.placed.contains(&model.parameters[*k].name);
     let placed: Vec<usize> = (0..model.parameters.len()).filter(is_placed).collect();
     let corrected = correction.at((problem, &model, &prediction.x), &placed, &poses);
@@ -68,12 +74,14 @@ pub fn predict(
         return Ok(CorrectedPrediction { prediction, poses: corrected });
     }
     let mut shifts: Vec<Vector3<f64>> = corrected.iter().map(|pose| pose.shift).collect();
-    let mut prediction = fit::predict(problem, Some(estimate), &shifted(rows, &shifts), split)?;
+    let measured = of_positions(rows, &shifts);
+    let mut prediction = fit::predict(problem, Some(estimate), &shifted(rows, &measured), split)?;
     in_measuring_frame(rows, &model.base_frames(prediction.x.as_slice()), &mut shifts);
     for (position, shift) in prediction.positions.iter_mut().zip(&shifts) {
         *position += shift;
     }
-    for (residual, shift) in prediction.residuals.iter_mut().flatten().zip(&shifts) {
+    let measured = of_positions(rows, &shifts);
+    for (residual, shift) in prediction.residuals.iter_mut().flatten().zip(&measured) {
         residual.predicted += shift;
     }
     Ok(CorrectedPrediction { prediction, poses: corrected })

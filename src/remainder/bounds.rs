@@ -24,6 +24,17 @@ pub struct Bounds {
     learned_from: usize,
 }
 
+/// Error bounds with the errors of measured positions that they are compared with.
+#[derive(Debug, Clone, Copy)]
+pub struct Compared<'a> {
+    /// Error bounds of the rows of a table.
+    pub bounds: &'a Bounds,
+    /// Row and error length \[m\] of each row that measures a position.
+    pub errors: &'a [(usize, f64)],
+    /// Comparison with the rows that were not fitted; `None` if there are none.
+    pub test: Option<&'a BoundTest>,
+}
+
 /// Comparison of error bounds with the errors of configurations that were not fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundTest {
@@ -118,14 +129,11 @@ impl Bounds {
         (squares.sum::<f64>() / self.poses.len() as f64).sqrt()
     }
 
-    /// Returns the share of the given error lengths \[m\], in the order of the poses, that do not
-    /// exceed their bounds.
-    pub fn coverage(&self, lengths: impl IntoIterator<Item = f64>) -> f64 {
-        let within: Vec<bool> = lengths
-            .into_iter()
-            .enumerate()
-            .map(|(pose, length)| length <= self.bound(pose))
-            .collect();
+    /// Returns the share of error lengths \[m\] that do not exceed their bounds; NaN if there are
+    /// none. Each error has the index of its pose.
+    pub fn coverage(&self, errors: impl IntoIterator<Item = (usize, f64)>) -> f64 {
+        let within = errors.into_iter().map(|(pose, length)| length <= self.bound(pose));
+        let within: Vec<bool> = within.collect();
         within.iter().filter(|within| **within).count() as f64 / within.len() as f64
     }
 

@@ -12,7 +12,7 @@ use super::training_rows::TrainingRows;
 use crate::fit::{ErrorSummary, Identification, IdentifyError, Placement};
 use crate::measurement::Dataset;
 use crate::model::Model;
-use crate::problem::{Observation, Problem};
+use crate::problem::Problem;
 
 /// Minimum number of configurations for which the uncertainty of predictions is estimated.
 pub(crate) const MIN_CONFIGURATIONS: usize = 10;
@@ -134,7 +134,9 @@ impl Fitted {
 /// outliers. The remainder is kept if it predicts left-out configurations significantly better
 /// (`Gain::is_significant`).
 ///
-/// Returns `None` if some rows measure no position, or there are fewer than ten configurations.
+/// Rows that measure no position inform about the parameters alone. If they are no known distances,
+/// no remainder is fitted, because it would move them too. Returns `None` if there are fewer than
+/// ten configurations whose positions are measured.
 ///
 /// # Errors
 /// Returns an error if `problem` and `data` are not those that were identified.
@@ -202,13 +204,11 @@ fn training_rows(
     model: &Model,
     data: &Dataset,
 ) -> Option<TrainingRows> {
-    let FittedRows { positions, distances, others } = fitted_rows(found, data);
-    if !others.is_empty() {
-        return None;
-    }
+    let FittedRows { positions, others } = fitted_rows(found, data);
     let times = (found.sigma, &found.start_times);
     let poses = timed_poses(&data.measurements, &positions, times);
-    let distances = timed_poses(&data.measurements, &distances, times);
+    let others = timed_poses(&data.measurements, &others, times);
+    let takes_remainder = !others.iter().any(|pose| pose.observation.is_of_arm());
     let is_free = |k: &usize| {
         let estimate = &found.estimates[*k];
         estimate.fitted && estimate.at_bound.is_none()
@@ -221,7 +221,7 @@ fn training_rows(
     let mut linearisation = Linearisation { problem, model, x: &found.x, unknowns, sigma };
     let layout = linearisation.layout(&poses);
     let mut rows = linearisation.rows(&layout, poses);
-    let (slopes, lengths) = linearisation.whitened(distances);
+    let (slopes, residuals) = linearisation.whitened(others);
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
     let is_usable = finite(rows.residual.as_slice())
         && finite(rows.jacobian.as_slice())
@@ -232,9 +232,9 @@ fn training_rows(
     rows.jacobian = rows.jacobian.select_columns(&seen);
     linearisation.unknowns = seen.iter().map(|&j| linearisation.unknowns[j]).collect();
     let prior = prior(model, &found.x, &linearisation.unknowns, &rows)
-        .with_distances(&slopes.select_columns(&seen), &lengths);
+        .with_information(&slopes.select_columns(&seen), &residuals);
     let unknowns = (layout, linearisation.unknowns);
-    let training = TrainingRows::new(unknowns, rows, (prior, sigma));
+    let training = TrainingRows::new(unknowns, rows, (prior, sigma), takes_remainder);
     let suffices = training.configurations.len() >= MIN_CONFIGURATIONS && training.size > 0.0;
     (is_usable && suffices).then_some(training)
 }
@@ -243,27 +243,18 @@ fn training_rows(
 pub(super) struct FittedRows {
     /// Indices of the rows that measure positions, above [`MAX_ROWS`] every n-th of them.
     pub positions: Vec<usize>,
-    /// Indices of the rows that state a known distance.
-    pub distances: Vec<usize>,
-    /// Indices of the rows that measure something else.
+    /// Indices of the rows that state a known distance or measure something else.
     pub others: Vec<usize>,
 }
 
 /// Returns the identification rows of `data` that are no outliers of `found`, by what they measure.
 pub(super) fn fitted_rows(found: &Identification, data: &Dataset) -> FittedRows {
     let outliers: HashSet<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
-    let mut fitted =
-        FittedRows { positions: Vec::new(), distances: Vec::new(), others: Vec::new() };
-    for row in data.split.identification.iter().copied().filter(|row| !outliers.contains(row)) {
-        match data.measurements.observation(row) {
-            Observation::Position | Observation::Point(_) => fitted.positions.push(row),
-            Observation::Between(..) => fitted.distances.push(row),
-            _ => fitted.others.push(row),
-        }
-    }
-    let step = fitted.positions.len().div_ceil(MAX_ROWS).max(1);
-    fitted.positions = fitted.positions.into_iter().step_by(step).collect();
-    fitted
+    let rows = data.split.identification.iter().copied().filter(|row| !outliers.contains(row));
+    let (positions, others): (Vec<usize>, Vec<usize>) =
+        rows.partition(|&row| data.measurements.observation(row).is_of_position());
+    let step = positions.len().div_ceil(MAX_ROWS).max(1);
+    FittedRows { positions: positions.into_iter().step_by(step).collect(), others }
 }
 
 /// Returns true if left-out rows have shorter errors than the same rows of `others`, by more than

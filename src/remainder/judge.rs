@@ -71,6 +71,7 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
     let without =
         Judged { alone: plain, remainder: None, gain: None, left_out_lengths: Vec::new() };
     let is_fitted = is_remainder_wanted
+        && training.takes_remainder
         && !training.layout.sites.is_empty()
         && training.configurations.len() >= MIN_CONFIGURATIONS_FOR_REMAINDER;
     let searched = is_fitted.then(|| search(training)).flatten();

@@ -227,7 +227,7 @@ pub(super) fn prior(
     ParameterPrior {
         mean: DVector::from_fn(unknowns.len(), mean),
         spread: DVector::from_fn(unknowns.len(), |j, _| declared(j).unwrap_or_else(|| wide(j))),
-        distances: None,
+        information: None,
     }
 }
 

@@ -49,7 +49,7 @@ pub(crate) use saved::{FORMAT, SavedRemainder};
 #[doc(hidden)]
 pub use self::{
     apply::{compensate, predict_identified},
-    bounds::{BoundTest, Bounds},
+    bounds::{BoundTest, Bounds, Compared},
     compensation::{Compensation, CompensationError, TargetFrame},
     declared::{declared, of_estimate},
     fit::uncertainty,

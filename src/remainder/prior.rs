@@ -12,25 +12,28 @@ pub(super) struct ParameterPrior {
     pub mean: DVector<f64>,
     /// Prior standard deviations of the parameters: the diagonal of S½.
     pub spread: DVector<f64>,
-    /// Known distances, which no error of a joint moves; `None` if there are none.
-    pub distances: Option<DistanceRows>,
+    /// Rows that inform about the parameters alone; `None` if there are none.
+    pub information: Option<InformationRows>,
 }
 
-/// Linearised rows of known distances, divided by their σ.
+/// Linearised rows that inform about the parameters alone, divided by their σ: known distances,
+/// which no error of a joint moves, and other rows that measure no position, beside which no
+/// remainder is fitted.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct DistanceRows {
-    /// Scaled Jacobian J S½ of the distances.
+pub(super) struct InformationRows {
+    /// Scaled Jacobian J S½ of these rows.
     scaled: DMatrix<f64>,
     /// Residuals at the mean of the prior, r − J m.
     target: DVector<f64>,
 }
 
 impl ParameterPrior {
-    /// Adds rows of known distances. `jacobian` and `residual` are divided by their σ.
-    pub fn with_distances(mut self, jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Self {
+    /// Adds rows that inform about the parameters alone. `jacobian` and `residual` are divided by
+    /// their σ.
+    pub fn with_information(mut self, jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Self {
         if jacobian.nrows() > 0 {
             let target = residual - jacobian * &self.mean;
-            self.distances = Some(DistanceRows { scaled: self.scale(jacobian), target });
+            self.information = Some(InformationRows { scaled: self.scale(jacobian), target });
         }
         self
     }
@@ -40,15 +43,15 @@ impl ParameterPrior {
         &rows.residual - &rows.jacobian * &self.mean
     }
 
-    /// Returns the residuals of `rows` at the mean of the parameters given the known distances, and
-    /// their Jacobian times a factor of the covariance of the parameters given these distances.
-    /// Without known distances these are r − J m and J S½.
+    /// Returns the residuals of `rows` at the mean of the parameters given the information rows, and
+    /// their Jacobian times a factor of the covariance of the parameters given these rows. Without
+    /// information rows these are r − J m and J S½.
     ///
-    /// With the scaled rows G and g of the distances, z = S^(−½) (δ − m) has the precision I + GᵀG
+    /// With the scaled information rows G and g, z = S^(−½) (δ − m) has the precision I + GᵀG
     /// = L Lᵀ and the mean (L Lᵀ)⁻¹ Gᵀg. Returns `None` if L does not exist because of rounding.
     pub fn reduce(&self, rows: &Rows) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let (mut target, mut scaled) = (self.residuals(rows), self.scale(&rows.jacobian));
-        if let Some(DistanceRows { scaled: known, target: measured }) = &self.distances {
+        if let Some(InformationRows { scaled: known, target: measured }) = &self.information {
             let n = known.ncols();
             let factor = lower_factor(DMatrix::identity(n, n) + gram(known))?;
             // With X = L⁻¹ (J S½)ᵀ, the Jacobian times the factor is Xᵀ.
@@ -60,10 +63,10 @@ impl ParameterPrior {
         Some((target, scaled))
     }
 
-    /// Adds the information of the known distances about the last of the standardised `features`:
+    /// Adds what the information rows tell about the last of the standardised `features`:
     /// GᵀG to their precision, and Gᵀg to its product with their mean.
     pub fn add_information(&self, precision: &mut DMatrix<f64>, product: &mut DVector<f64>) {
-        let Some(DistanceRows { scaled, target }) = &self.distances else { return };
+        let Some(InformationRows { scaled, target }) = &self.information else { return };
         let (count, first) = (scaled.ncols(), product.len() - scaled.ncols());
         let mut block = precision.view_mut((first, first), (count, count));
         block += gram(scaled);

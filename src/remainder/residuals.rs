@@ -49,7 +49,8 @@ pub fn residuals(
     let placed = placed(found, &model, correction);
     let corrected = correction.at((problem, &model, &found.x), &placed, &poses);
     if correction.has_remainder() {
-        let mut shifts: Vec<Vector3<f64>> = corrected.iter().map(|pose| pose.shift).collect();
+        let shifts: Vec<Vector3<f64>> = corrected.iter().map(|pose| pose.shift).collect();
+        let mut shifts = of_positions(table, &shifts);
         let placement = PlacementFit::new((problem, &model, &found.x), &placed, &poses);
         placement.refit(&mut shifts, &model.residuals(poses, &found.x));
         in_measuring_frame(table, &model.base_frames(found.x.as_slice()), &mut shifts);
@@ -73,6 +74,15 @@ pub fn residuals(
         is_left_out,
     };
     Ok(CorrectedResiduals { rows, poses: corrected, errors })
+}
+
+/// Returns the shifts of rows that measure positions, and 0 for other rows, whose numbers a
+/// remainder does not correct.
+pub(super) fn of_positions(table: &Measurements, shifts: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let of_row = |(row, shift): (usize, &Vector3<f64>)| {
+        if table.observation(row).is_of_position() { *shift } else { Vector3::zeros() }
+    };
+    shifts.iter().enumerate().map(of_row).collect()
 }
 
 /// Rotates the shifts of rows that touch a point from the axes of the arm's base to the measuring

@@ -340,7 +340,7 @@ impl Correction {
             mean: of_parameters(|parameter| parameter.prior_mean),
             spread: of_parameters(|parameter| parameter.prior_sigma),
             // The saved factor of the precision contains what they say.
-            distances: None,
+            information: None,
         };
         let centres = Rows {
             residual: DVector::zeros(AXES * count),

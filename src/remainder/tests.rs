@@ -49,7 +49,7 @@ fn prior() -> ParameterPrior {
     ParameterPrior {
         mean: DVector::from_vec(vec![1e-5, -2e-5]),
         spread: DVector::from_vec(vec![3e-4, 1e-1]),
-        distances: None,
+        information: None,
     }
 }
 
@@ -192,7 +192,7 @@ fn known_distances_count_as_rows_that_no_joint_error_moves() {
     more.jacobian.rows_range_mut(place(last)).copy_from(&jacobian);
     // A row of its own configuration has the noise of the row and that of the configuration.
     let sigma = (hyper.noise * known).hypot(hyper.shared_noise);
-    let with = prior.clone().with_distances(&(jacobian / sigma), &(residual / sigma));
+    let with = prior.clone().with_information(&(jacobian / sigma), &(residual / sigma));
     let centres = [of(0), of(4), of(8)];
     let posterior = |rows: &Rows, prior: &ParameterPrior| {
         Training::new((rows, &inputs), prior, &hyper, &centres).unwrap().posterior

@@ -35,6 +35,8 @@ pub(super) struct TrainingRows {
     /// Indices of the rows that are left out to test predictions: all, or those of some
     /// configurations.
     pub judged: Vec<usize>,
+    /// True if a remainder can be fitted: joint errors move no rows but these.
+    pub takes_remainder: bool,
 }
 
 impl TrainingRows {
@@ -43,12 +45,22 @@ impl TrainingRows {
         (layout, unknowns): (Layout, Vec<usize>),
         rows: Rows,
         (prior, sigma): (ParameterPrior, f64),
+        takes_remainder: bool,
     ) -> Self {
         let size = (rows.residual.norm_squared() / rows.len().max(1) as f64).sqrt();
         let configurations = rows.configurations();
         let judged = Vec::new();
-        let mut training =
-            Self { layout, unknowns, rows, sigma, prior, size, configurations, judged };
+        let mut training = Self {
+            layout,
+            unknowns,
+            rows,
+            sigma,
+            prior,
+            size,
+            configurations,
+            judged,
+            takes_remainder,
+        };
         training.judged = training.some_rows(MAX_JUDGED_ROWS, 3);
         training
     }

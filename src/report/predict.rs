@@ -11,12 +11,7 @@ use super::row_kinds::unsteady_points;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, percent_of};
-use crate::remainder::{BoundTest, Bounds};
-
-/// Error bounds of the predicted rows, with their test by the rows that were not fitted; the test
-/// is
-/// `None` if there are no such rows.
-pub(crate) type Tested<'a> = (&'a Bounds, Option<&'a BoundTest>);
+use crate::remainder::{Bounds, Compared};
 
 /// Returns the predictions, with a figure of the errors of measured rows. `arm` describes the arm
 /// that was used, and `fitted` lists the predicted rows (from 0, ascending) to which that arm was
@@ -25,7 +20,7 @@ pub(crate) fn prediction(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
-    (bounds, fitted): (Option<Tested>, &[usize]),
+    (compared, fitted): (Option<Compared>, &[usize]),
 ) -> Story {
     let mut words = format!("{} predicted for {arm}", counted(prediction.positions.len(), "pose"));
     let lost = prediction
@@ -65,17 +60,17 @@ pub(crate) fn prediction(
         )));
     }
     // If base or tool are fitted to these rows, a few rows do not test the bounds.
-    let residuals = prediction.residuals.as_deref();
-    let residuals = residuals.filter(|rows| 3 * rows.len() > prediction.placed.len());
     blocks.extend(fitted_rows_sentence(prediction, fitted).map(Block::Text));
-    blocks.extend(bounds.map(|(bounds, test)| {
-        Block::lines(bound_sentence(bounds, residuals.map(|residuals| (residuals, test))))
+    blocks.extend(compared.map(|compared| {
+        let suffices = 3 * compared.errors.len() > prediction.placed.len();
+        Block::lines(bound_sentence(compared.bounds, Some(compared).filter(|_| suffices)))
     }));
     let unsteady = unsteady_points(&prediction.spreads);
     if !unsteady.is_empty() {
         blocks.push(Block::list(unsteady));
     }
-    blocks.push(Block::figures([draw_errors(prediction, bounds.map(|(bounds, _)| bounds))]));
+    blocks
+        .push(Block::figures([draw_errors(prediction, compared.map(|compared| compared.bounds))]));
     Story::new(&problem.title, "predictions", blocks)
 }
 

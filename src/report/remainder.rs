@@ -5,9 +5,11 @@ use std::fmt::Write as _;
 use super::document::{Block, Column, Table, code};
 use super::figures;
 use super::render::text_width;
-use crate::fit::{ErrorSummary, Identification, Residual};
+use crate::fit::{ErrorSummary, Identification};
 use crate::quantity::format::{counted, mm, number, percent_of, two_digits};
-use crate::remainder::{BoundTest, Bounds, Carried, Gain, JointError, MIN_CONFIGURATIONS, Outcome};
+use crate::remainder::{
+    BoundTest, Bounds, Carried, Compared, Gain, JointError, MIN_CONFIGURATIONS, Outcome,
+};
 use crate::results::PlotData;
 
 /// States the result of the search for a remainder; `found` has the errors without a remainder.
@@ -247,38 +249,32 @@ pub(super) fn chance_of_bound(test: Option<&BoundTest>, noun: &str) -> String {
 /// predictions of the model itself. Tables round positions to 0.1 µm.
 const MAX_COMPUTED_ERROR: f64 = 2e-3;
 
-/// Returns true if the residuals are so small that the positions of all rows must be predictions of
+/// Returns true if the errors are so small that the positions of all rows must be predictions of
 /// the model, not measurements.
-fn are_predicted(bounds: &Bounds, residuals: &[Residual]) -> bool {
-    let lengths = || residuals.iter().map(|row| row.position.norm());
-    let largest = lengths().fold(0.0, f64::max);
-    !residuals.is_empty()
-        && lengths().all(f64::is_finite)
+fn are_predicted(bounds: &Bounds, errors: &[(usize, f64)]) -> bool {
+    let largest = errors.iter().map(|(_, length)| *length).fold(0.0, f64::max);
+    errors.iter().all(|(_, length)| length.is_finite())
         && largest <= MAX_COMPUTED_ERROR * bounds.expected()
 }
 
-/// States the expected error and its mean bound. With `measured`, which holds the residuals of the
-/// rows and the test of the bounds by rows that were not fitted, adds the share of rows within
+/// States the expected error and its mean bound. With `compared`, adds the share of rows within
 /// their bounds and what the test says.
-pub(super) fn bound_sentence(
-    bounds: &Bounds,
-    measured: Option<(&[Residual], Option<&BoundTest>)>,
-) -> String {
-    let residuals = measured.map(|(residuals, _)| residuals);
-    let test = measured.and_then(|(_, test)| test);
+pub(super) fn bound_sentence(bounds: &Bounds, compared: Option<Compared>) -> String {
+    let compared = compared.filter(|compared| !compared.errors.is_empty());
+    let test = compared.and_then(|compared| compared.test);
     let mut words = format!(
         "Expected error {} mm rms, measurement noise included; the {} % bound is {} mm on average",
         number(bounds.expected() * 1e3, 3),
         percent_of(bounds.level),
         number(bounds.mean() * 1e3, 3),
     );
-    if let Some(residuals) = residuals
-        && are_predicted(bounds, residuals)
+    if let Some(compared) = compared
+        && are_predicted(bounds, compared.errors)
     {
         words += "; the positions of these rows are predictions of the model, such as targets of commands.csv, so their errors verify \
                   nothing";
-    } else if let Some(residuals) = residuals {
-        let share = bounds.coverage(residuals.iter().map(|pose| pose.position.norm()));
+    } else if let Some(compared) = compared {
+        let share = bounds.coverage(compared.errors.iter().copied());
         let share = number(share * 100.0, 1);
         let _ = write!(words, "; {share} % of these rows lie within their bounds");
     }

@@ -10,9 +10,9 @@ use serde::Serialize;
 use super::identification::Spread;
 use super::remainder::BoundSummary;
 use super::summary::Summary;
-use crate::fit::{Command, ErrorsBySession, PointSpread, Residual};
+use crate::fit::{Command, ErrorsBySession, PointSpread};
 use crate::problem::Problem;
-use crate::remainder::{BoundTest, Bounds};
+use crate::remainder::{BoundTest, Bounds, Compared};
 use crate::urdf::{Chain, Description};
 
 /// Errors of predictions against measurements.
@@ -66,16 +66,11 @@ impl PredictionErrors {
         }
     }
 
-    /// Returns the errors with a summary of their bounds, with the share of `residuals` that are
-    /// within the bounds, and with the `test` of the bounds by rows that were not fitted.
+    /// Returns the errors with a summary of their bounds, with the share of measured positions that
+    /// are within the bounds, and with the test of the bounds by rows that were not fitted.
     #[must_use]
-    pub fn with_bounds(
-        self,
-        residuals: &[Residual],
-        (bounds, test): (&Bounds, Option<&BoundTest>),
-    ) -> Self {
-        let lengths = residuals.iter().map(|residual| residual.position.norm());
-        let coverage = Some(bounds.coverage(lengths));
+    pub fn with_bounds(self, Compared { bounds, errors, test }: Compared) -> Self {
+        let coverage = (!errors.is_empty()).then(|| bounds.coverage(errors.iter().copied()));
         let coverage_p_value = test.map(BoundTest::chance);
         Self { coverage, coverage_p_value, bounds: Some(BoundSummary::new(bounds)), ..self }
     }

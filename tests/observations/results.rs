@@ -396,3 +396,25 @@ fn every_kind_is_told_in_its_own_terms() {
     assert!(!compared.contains("max x"), "{compared}");
     assert_contains(&compared, &["contacts with points to identify"]);
 }
+
+#[test]
+fn positions_beside_other_rows_have_error_bounds() {
+    let folder = bench(AROUND, &["position", "distance", "plane", "tilt"], 30);
+    folder.flexcal("identify . --out fit").success();
+    folder.flexcal("predict . --estimate fit/estimate.json --out rows").success();
+    let mut rows = csv::Reader::from_path(folder.path("rows/predictions.csv")).unwrap();
+    let bounds: Vec<f64> = rows
+        .deserialize()
+        .map(|row| row.unwrap())
+        .map(|row: BTreeMap<String, String>| row["bound95_mm"].parse().unwrap())
+        .collect();
+    assert!(bounds.iter().all(|bound| (0.05..1.0).contains(bound)), "{bounds:?}");
+    // Only the rows of positions are compared with their bounds.
+    let lengths = Residuals::read(&folder, "rows/residuals.csv").0;
+    let positions = || lengths.iter().zip(&bounds).filter(|((kind, ..), _)| *kind == "position");
+    let within = positions().filter(|((.., length), bound)| length <= *bound).count();
+    let errors = folder.json("rows/errors.json");
+    let coverage = within as f64 / positions().count() as f64;
+    assert!((number(&errors["coverage"]) - coverage).abs() < 1e-9, "{coverage}: {errors}");
+    assert!(coverage > 0.85, "{coverage}");
+}

@@ -58,9 +58,9 @@ impl Uncertainty {
     ) -> Result<Self, IdentifyError> {
         let table = &data.measurements;
         let mut rng = stream(SEED, 0);
-        let of_arm = |row: &&usize| table.observation(**row).is_of_arm();
+        let is_position = |row: &&usize| table.observation(**row).is_of_position();
         let measured: Vec<usize> =
-            data.split.identification.iter().filter(of_arm).copied().collect();
+            data.split.identification.iter().filter(is_position).copied().collect();
         let values: Vec<Vec<f64>> = (0..table.joints)
             .map(|joint| {
                 let of_joint = measured.iter().map(|&row| table.configuration(row)[joint]);

@@ -6,7 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
-use super::found::{Found, found, with_misread_effect};
+use super::found::{Found, found};
+use super::misread_effect::with_misread_effect;
 use super::search::search;
 use super::state::{Round, SearchState};
 use super::status::{Status, Verdict};

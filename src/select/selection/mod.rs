@@ -7,13 +7,14 @@
 //! - `close`: runs the loop from the declared problem to its result, with the gain on held-out
 //!   poses.
 //! - `remainder`: corrects what no sure law explains.
-//! - `found`: the effect that expresses a misread table, with which the search begins, and the
-//!   claims about each effect, compared with plainer causes that together do the same.
+//! - `misread_effect`: the effect that expresses a misread table, with which the search begins.
+//! - `found`: the claims about each effect, compared with plainer causes that together do the same.
 //! - `status`: the status of each effect, and the verdict.
 
 mod close;
 mod found;
 mod gears;
+mod misread_effect;
 mod remainder;
 mod search;
 mod state;
