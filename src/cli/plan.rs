@@ -163,6 +163,7 @@ fn columns_at_hand(
             given.time_measured,
             poses.time_measured,
         ),
+        ("those of the orientation", given.orientations.is_some(), poses.orientations.is_some()),
         ("payload_kg", given.payload.is_some(), poses.payload.is_some()),
         ("hoist_N", given.hoist.is_some(), poses.hoist.is_some()),
         ("temperature_C", given.temperature.is_some(), poses.temperature.is_some()),

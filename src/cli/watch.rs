@@ -121,6 +121,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             } else {
                 update
             }
+        } else if watch.has_drifted() {
+            format!(
+                "flexcal identify {} --prior {file}{} --out {} takes the drift over into an                  estimate, because the old one errs by more than its bounds say",
+                common.problem_arguments(),
+                drift_argument(arguments.drift),
+                unused_folder(&arguments.estimate, "update")
+            )
         } else {
             advice::after_applying(common, &problem, &estimate, &arguments.estimate)
         };

@@ -41,4 +41,5 @@ pub use reporter::{Change, WatchedCause};
 #[doc(hidden)]
 pub use update::{Update, update};
 #[doc(hidden)]
+pub(crate) use watch::MIN_EXPECTED_P;
 pub use watch::{Watch, watch};

@@ -26,6 +26,12 @@ use crate::spatial::Frame;
 const MAX_REPORTED_CAUSES: usize = 6;
 /// Smallest probability at which a cause is reported that is not the most probable one.
 const MIN_REPORTED_PROBABILITY: f64 = 0.005;
+/// p-value of χ² below which noise and the known misfit, with drift if there is any, do not explain
+/// the rows.
+pub(crate) const MIN_EXPECTED_P: f64 = 0.01;
+/// Largest ratio of the errors after a base is registered to those before at which the base counts
+/// as moved, though the rows show another change too.
+const MAX_REGISTERED_ERROR: f64 = 0.05;
 /// Prior odds that something else changed together with a placement (a base, camera or marker),
 /// against the placement alone.
 const SECOND_CHANGE_ODDS: f64 = 0.05;
@@ -59,6 +65,10 @@ pub struct Watch {
     pub changed_at: Option<usize>,
     /// χ² of all rows under "unchanged", its degrees of freedom, and its p-value.
     pub chi2: (f64, f64, f64),
+    /// Days since the estimate, whose drift counts as no change.
+    pub days: f64,
+    /// p-value of the rows under "unchanged" without any drift; `None` for an estimate without age.
+    pub p_without_drift: Option<f64>,
     /// Root mean square error with which the estimate predicts the rows of the leading kind \[m\]
     /// or \[rad\].
     pub error: f64,
@@ -75,6 +85,12 @@ impl Watch {
     /// Returns true if the test found that the arm or its measurement has changed.
     pub fn is_changed(&self) -> bool {
         self.changed_at.is_some()
+    }
+
+    /// Returns true if nothing has changed, but only because drift explains the rows: without drift
+    /// their p-value is below [`MIN_EXPECTED_P`].
+    pub fn has_drifted(&self) -> bool {
+        !self.is_changed() && self.p_without_drift.is_some_and(|p| p < MIN_EXPECTED_P)
     }
 
     /// Returns the most probable cause if it can be named: the arm has changed, the probability is
@@ -142,8 +158,12 @@ pub fn watch(
         let Linearised { rows, factor, causes, .. } = &at_estimate;
         assessed.causes = with_onsets(&assessed, rows, factor, causes).ok_or_else(not_finite)?;
     }
-    let p_value = ChiSquared::new(assessed.coordinates)
-        .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
+    let undrifted = (days > 0.0).then(|| Earlier::of_estimate(estimate, problem, &model, 0.0));
+    let undrifted = undrifted.transpose()?.and_then(|earlier| {
+        let Linearised { rows, factor, causes, .. } = tested.linearised(&poses, &x, &earlier);
+        let assessed = assess(&rows, &factor, &causes, false)?;
+        Some(p_value(assessed.chi2, assessed.coordinates))
+    });
     let report = at_estimate.reporter(&leads);
     let reported: Vec<&AssessedCause> = assessed
         .causes
@@ -180,7 +200,9 @@ pub fn watch(
         leaves_remainder: estimate.remainder.is_some(),
         looks: assessed.looks,
         changed_at,
-        chi2: (assessed.chi2, assessed.coordinates, p_value),
+        chi2: (assessed.chi2, assessed.coordinates, p_value(assessed.chi2, assessed.coordinates)),
+        days,
+        p_without_drift: undrifted,
         error: report.rms(|row| at_estimate.rows.residual_of(row)),
         unit: kind_named(leading.kind()).unit,
         sigma: leads
@@ -294,9 +316,11 @@ impl TestedRows<'_> {
     }
 
     /// Returns a move of the only base as the cause, if it explains the rows: after the base has
-    /// been registered to them, ln of the evidence for another change is below `threshold`. A
-    /// rotation about the axis of joint 1 may as well be a changed zero of that joint, which is
-    /// then returned as a second cause. Returns `None` if the base does not explain the rows.
+    /// been registered to them, ln of the evidence for another change is below `threshold`, or the
+    /// errors are a small fraction of those before, so that the base has moved whatever else
+    /// changed. A rotation about the axis of joint 1 may as well be a changed zero of that joint,
+    /// which is then returned as a second cause. Returns `None` if the base does not explain the
+    /// rows.
     ///
     /// Other tests take positions as linear in the changes, which fails for a base that is rotated
     /// by some degrees.
@@ -327,12 +351,18 @@ impl TestedRows<'_> {
         let assessed = assess(&at_base.rows, &at_base.factor, &at_base.causes, false)?;
         let (_, evidence) = *assessed.looks.last()?;
         let is_base = |cause: &&AssessedCause| at_base.causes[cause.cause].kind == CauseKind::Base;
-        let base = assessed.causes.iter().find(is_base).filter(|_| evidence < threshold)?;
+        let base = assessed.causes.iter().find(is_base)?;
+        let before = SensitiveRows::new(self.model, poses.to_vec(), x).residual.norm();
+        let is_alone = evidence < threshold;
+        if !is_alone && at_base.rows.residual.norm() > MAX_REGISTERED_ERROR * before {
+            return None;
+        }
         let mut watched = at_base.reporter(leads).cause(base, None);
         for (change, &k) in watched.changes.iter_mut().zip(&at_base.causes[base.cause].columns) {
             change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);
         }
-        watched.probability = 1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp());
+        watched.probability =
+            if is_alone { 1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp()) } else { 1.0 };
         let frame = |x: &DVector<f64>| model.base_frames(x.as_slice()).into_iter().next();
         let angle = turn_about_first_joint(self.problem, &frame(x)?, &frame(&registered)?);
         let Some(angle) = angle else { return Some(vec![watched]) };
@@ -386,6 +416,11 @@ fn turn_about_first_joint(problem: &Problem, old: &Frame<f64>, new: &Frame<f64>)
 /// Returns true if at least one row measures a position.
 fn has_positions(measurements: &Measurements) -> bool {
     (0..measurements.len()).any(|row| measurements.observation(row).is_position())
+}
+
+/// Returns the p-value of χ² with `coordinates` degrees of freedom.
+fn p_value(chi2: f64, coordinates: f64) -> f64 {
+    ChiSquared::new(coordinates).map_or(f64::NAN, |distribution| distribution.sf(chi2))
 }
 
 /// Number of standard errors by which the variance of prediction errors must exceed the declared

@@ -3,8 +3,9 @@
 use crate::error::{Location, Warning, WarningKind};
 use crate::problem::JoinRule;
 
-/// Maximum time between paired rows when a shift between the clocks is searched \[s\].
-const MAX_PAIR_GAP: f64 = 0.5;
+/// Maximum time between paired rows when a shift between the clocks is searched, unless the problem
+/// allows more \[s\].
+const PAIR_GAP: f64 = 0.5;
 /// Maximum number of rows of the joint table for which a shift is searched. A table with more rows
 /// is a continuous log, in which every shift finds partners.
 const MAX_LOG_ROWS: usize = 2000;
@@ -25,15 +26,18 @@ const MAX_RIVAL_FRACTION: f64 = 0.7;
 /// Returns the shift \[s\] that must be added to the times of a joint table, so that its rows pair
 /// best with the rows measured at `times` \[s\].
 ///
-/// `log` are the times of the joint table in ascending order \[s\]. Returns `None` if no shift
+/// `log` are the times of the joint table in ascending order \[s\]. Rows pair if their times differ
+/// by at most `tolerance` \[s\], or by half a second if that is more. Returns `None` if no shift
 /// pairs most rows, or if several do.
-pub(super) fn best_shift(times: &[f64], log: &[f64]) -> Option<f64> {
+pub(super) fn best_shift(times: &[f64], log: &[f64], tolerance: f64) -> Option<f64> {
+    let gap = tolerance.max(PAIR_GAP);
     if log.len() > MAX_LOG_ROWS {
         return None;
     }
     let tested = evenly(times, MAX_TESTED_ROWS);
     let count = |shift: f64| {
-        let mut partners: Vec<usize> = pairs(&tested, log, shift).map(|(_, row)| row).collect();
+        let mut partners: Vec<usize> =
+            pairs(&tested, (log, gap), shift).map(|(_, row)| row).collect();
         partners.sort_unstable();
         partners.dedup();
         partners.len()
@@ -43,13 +47,13 @@ pub(super) fn best_shift(times: &[f64], log: &[f64]) -> Option<f64> {
     let counted: Vec<(usize, f64)> = shifts.map(|shift| (count(shift), shift)).collect();
     let &(most, best) = counted.iter().max_by_key(|(pairs, _)| *pairs)?;
     let is_rival = |&&(pairs, shift): &&(usize, f64)| {
-        (shift - best).abs() > 4.0 * MAX_PAIR_GAP && pairs as f64 > MAX_RIVAL_FRACTION * most as f64
+        (shift - best).abs() > 4.0 * gap && pairs as f64 > MAX_RIVAL_FRACTION * most as f64
     };
     let is_clear = most >= MIN_PAIRS && most as f64 >= MIN_PAIRED_FRACTION * tested.len() as f64;
     if !is_clear || counted.iter().any(|counted| is_rival(&counted)) {
         return None;
     }
-    let mut differences: Vec<f64> = pairs(&tested, log, best)
+    let mut differences: Vec<f64> = pairs(&tested, (log, gap), best)
         .filter_map(|(time, row)| log.get(row).map(|logged| time - logged))
         .collect();
     differences.sort_by(f64::total_cmp);
@@ -65,7 +69,7 @@ const MAX_OFF_QUARTER: f64 = 2.0;
 /// Returns the whole quarters of an hour \[s\] that must be added to `times` \[s\], those of the
 /// rows without a partner, so that they have partners in `log`. `None` if no such shift is certain.
 fn zone_change(times: &[f64], log: &[f64]) -> Option<f64> {
-    let shift = -best_shift(times, log)?;
+    let shift = -best_shift(times, log, PAIR_GAP)?;
     let whole = (shift / QUARTER_HOUR).round() * QUARTER_HOUR;
     (whole != 0.0 && (shift - whole).abs() < MAX_OFF_QUARTER).then_some(whole)
 }
@@ -95,12 +99,16 @@ fn evenly(times: &[f64], most: usize) -> Vec<f64> {
     times.iter().copied().step_by(times.len().div_ceil(most).max(1)).collect()
 }
 
-/// Iterates over the measured times that have a partner if `shift` \[s\] is added to the times of
-/// the log, with the index of that partner.
-fn pairs(times: &[f64], log: &[f64], shift: f64) -> impl Iterator<Item = (f64, usize)> {
+/// Iterates over the measured times that have a partner in `log`, at most `most` \[s\] away, if
+/// `shift` \[s\] is added to the times of the log. Each is returned with the index of its partner.
+fn pairs(
+    times: &[f64],
+    (log, most): (&[f64], f64),
+    shift: f64,
+) -> impl Iterator<Item = (f64, usize)> {
     times.iter().filter_map(move |&time| {
         let (row, gap) = nearest(log, time - shift)?;
-        (gap <= MAX_PAIR_GAP).then_some((time, row))
+        (gap <= most).then_some((time, row))
     })
 }
 
@@ -122,12 +130,19 @@ mod tests {
         let uneven: Vec<f64> =
             (0..30).map(|k| f64::from(k * 8) + f64::from(k * k % 31) / 4.0).collect();
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
-        let shift = best_shift(&late, &uneven).unwrap_or(0.0);
+        let shift = best_shift(&late, &uneven, 0.0).unwrap_or(0.0);
         assert!((shift - 47.03).abs() < 1e-9, "{shift}");
+        // Stamps that scatter by more than half a second need a tolerance.
+        let slow: Vec<f64> = uneven.iter().map(|time| 6.0 * time).collect();
+        let scattered = |k: usize, time: &f64| time + 73.4 + f64::from(u32::from(k % 2 == 0)) * 1.4;
+        let late: Vec<f64> = slow.iter().enumerate().map(|(k, time)| scattered(k, time)).collect();
+        assert_eq!(best_shift(&late, &slow, 0.5), None);
+        let shift = best_shift(&late, &slow, 2.0).unwrap_or(0.0);
+        assert!((shift - 74.1).abs() < 0.8, "{shift}");
         let even: Vec<f64> = (0..30).map(|k| f64::from(k * 8)).collect();
         let late: Vec<f64> = even.iter().map(|time| time + 47.03).collect();
-        assert_eq!(best_shift(&late, &even), None);
-        assert_eq!(best_shift(&[], &even), None);
+        assert_eq!(best_shift(&late, &even, 0.0), None);
+        assert_eq!(best_shift(&[], &even, 0.0), None);
         let late: Vec<f64> = uneven.iter().map(|time| time + 3600.3).collect();
         assert_eq!(zone_change(&late, &uneven), Some(-3600.0));
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();

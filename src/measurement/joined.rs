@@ -295,10 +295,12 @@ impl JoinedLog {
     }
 
     /// Returns the offset with which the rows of both tables pair best, as the value of `offset_s`;
-    /// `None` if the tables are not joined by time or no offset is certain.
-    fn offset(&self) -> Option<String> {
-        let JoinRule::Time { offset, .. } = self.rule else { return None };
-        let shift = best_shift(&self.times, &self.log_times)?;
+    /// `None` if the tables are not joined by time or no offset is certain. Paired rows are close to
+    /// each other, or within the tolerance of the problem if `is_tolerant`.
+    fn offset(&self, is_tolerant: bool) -> Option<String> {
+        let JoinRule::Time { offset, tolerance } = self.rule else { return None };
+        let tolerance = if is_tolerant { tolerance } else { 0.0 };
+        let shift = best_shift(&self.times, &self.log_times, tolerance)?;
         let seconds = ((offset + shift) * 1e3).round() / 1e3;
         Some(format!("{seconds:?}"))
     }
@@ -329,13 +331,13 @@ impl JoinedLog {
             return error(TableErrorKind::NamesWrittenOtherwise { left, rows, pair: quoted(pair) });
         }
         if 2 * left > rows
-            && self.offset().is_none()
+            && self.offset(false).is_none()
             && let Some(table) = self.table_without_seconds()
         {
             return error(TableErrorKind::SecondsLost { table });
         }
         if self.paired == 0 && self.requested > 0 {
-            let (gap, keys, offset) = (self.gap(), self.keys(), self.offset());
+            let (gap, keys, offset) = (self.gap(), self.keys(), self.offset(true));
             return error(TableErrorKind::NothingJoined { gap, keys, offset });
         }
         if rows < MIN_CHECKED_ROWS {
@@ -351,7 +353,7 @@ impl JoinedLog {
             return Ok(());
         }
         if 2 * left > rows
-            && let Some(offset) = self.offset()
+            && let Some(offset) = self.offset(true)
         {
             let gap = self.gap();
             return error(TableErrorKind::MostUnpaired { left, rows, gap, offset });
@@ -360,10 +362,10 @@ impl JoinedLog {
         let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
         if let Some(row) = self.common_partner().filter(|_| usual > MAX_PLAUSIBLE_MEDIAN_GAP) {
             let partner = Location::file(&row.source.file).at_line(row.source.line).to_string();
-            let (same, keys, offset) = (row.uses, self.keys(), self.offset());
+            let (same, keys, offset) = (row.uses, self.keys(), self.offset(false));
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
         }
-        let offset = if usual > MAX_PLAUSIBLE_MEDIAN_GAP { self.offset() } else { None };
+        let offset = if usual > MAX_PLAUSIBLE_MEDIAN_GAP { self.offset(false) } else { None };
         match offset {
             Some(offset) => {
                 let gap = format!("{usual:.1} s");

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Table, last_parts, opening};
 use super::figures::{ACCENT, Curve, Drawing, Series};
 use super::render::Story;
-use crate::life::{CauseKind, Change, Watch, WatchedCause};
+use crate::life::{CauseKind, Change, MIN_EXPECTED_P, Watch, WatchedCause};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
 use crate::quantity::Unit;
@@ -15,9 +15,6 @@ use crate::quantity::format::{
 
 /// Header of the table of causes.
 const HEADER: [&str; 5] = ["cause", "probability", "change ± 1 σ", "error left out", "more poses"];
-/// p-value of the errors below which the text does not say that noise and the misfit explain
-/// them.
-const MIN_EXPECTED_P: f64 = 0.01;
 
 /// Returns the verdict, with a figure of the evidence after each of the tested `rows`.
 pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> Story {
@@ -39,11 +36,7 @@ pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> St
             ""
         },
         in_unit(watch.error),
-        match p {
-            _ if watch.is_changed() => "",
-            p if p < MIN_EXPECTED_P => ", more than noise and the known misfit explain",
-            _ => ", as expected from noise and the known misfit",
-        }
+        explanation(watch)
     );
     if watch.left_out > 0 {
         let rows = counted(watch.left_out, "row");
@@ -68,6 +61,31 @@ pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> St
         blocks.push(Block::Table(Table::new(&HEADER, rows, &[0, 2]).noted(&notes)));
     }
     Story::new(&problem.title, "watch", blocks)
+}
+
+/// Returns a number of days with its noun.
+fn days(days: f64) -> String {
+    let noun = if (days - 1.0).abs() < f64::EPSILON { "day" } else { "days" };
+    format!("{} {noun}", number(days, 2))
+}
+
+/// Says what explains the errors of rows without a change; empty if the arm has changed.
+fn explanation(watch: &Watch) -> String {
+    let drift = format!("{} of drift", days(watch.days));
+    match (watch.p_without_drift, watch.chi2.2) {
+        _ if watch.is_changed() => String::new(),
+        (None, p) if p < MIN_EXPECTED_P => {
+            ", more than noise and the known misfit explain".to_owned()
+        }
+        (Some(_), p) if p < MIN_EXPECTED_P => {
+            format!(", more than noise, the known misfit and {drift} explain")
+        }
+        (Some(p), _) if watch.has_drifted() => format!(
+            ", as expected from noise, the known misfit and {drift}; more than noise and the known misfit alone explain (p {})",
+            p_value(p)
+        ),
+        _ => ", as expected from noise and the known misfit".to_owned(),
+    }
 }
 
 /// Draws the evidence for a change after each row, with the level of an alarm; `None` for fewer

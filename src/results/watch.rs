@@ -35,6 +35,9 @@ pub struct WatchResult {
     pub chi2: f64,
     pub coordinates: f64,
     pub p_value: f64,
+    /// p-value of the rows under the assumption that nothing has changed and nothing drifts; null
+    /// without `drift_days`.
+    pub p_value_without_drift: Option<f64>,
     /// Root mean square error of the rows as the estimate predicts them, in `unit`.
     pub error: f64,
     /// Standard deviation (1 σ) of a coordinate, from noise and from the misfit of the estimate's
@@ -96,6 +99,7 @@ impl WatchResult {
             chi2,
             coordinates,
             p_value,
+            p_value_without_drift: watch.p_without_drift,
             error: watch.error * unit.factor,
             sigma: watch.sigma * unit.factor,
             unit: match watch.unit {

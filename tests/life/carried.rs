@@ -64,7 +64,7 @@ impl Errors {
         let bounds = Bounds::new(correction, poses, 0.95);
         Self {
             mean: lengths.iter().sum::<f64>() / lengths.len() as f64,
-            coverage: bounds.coverage(lengths.iter().copied()),
+            coverage: bounds.coverage(lengths.iter().copied().enumerate()),
         }
     }
 }

@@ -84,6 +84,20 @@ fn a_moved_zero_and_a_moved_tool_are_named_with_their_size() {
 }
 
 #[test]
+fn a_change_that_only_drift_explains_is_said_to_be_drift() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 2);
+    let within = |arm: &Problem, seed| {
+        let rows = bench.measure(arm, 12, seed, 1.0);
+        watch(&bench.problem, &estimate, &rows, (365.0, 0.01)).unwrap()
+    };
+    let verdict = within(&with_tool(&arm, Vector3::new(0.2e-3, 0.0, 0.1e-3)), 4003);
+    assert!(!verdict.is_changed() && verdict.chi2.2 > 0.01 && verdict.has_drifted(), "{verdict:?}");
+    let verdict = within(&arm, 4004);
+    assert!(!verdict.is_changed() && !verdict.has_drifted(), "{verdict:?}");
+}
+
+#[test]
 fn noise_a_gross_row_and_a_warm_arm_are_no_change_of_geometry() {
     let bench = Bench::new();
     let (arm, estimate) = calibrated(&bench, 4);
@@ -123,6 +137,20 @@ fn a_base_that_was_turned_far_is_named_with_its_move() {
     near(1, -0.3, 1e-2);
     near(5, 1.2, 1e-2);
     assert!(cause.left_out_error.unwrap() < 0.3e-3, "{cause:?}");
+}
+
+#[test]
+fn a_base_that_was_turned_far_is_named_beside_other_changes() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 2);
+    let arm = with_tool(&with_zero(&arm, 3, 0.05), Vector3::new(0.3e-3, 0.0, 0.0));
+    let mut rows = bench.measure(&arm, 15, 4105, 1.0);
+    let turn = Rotation3::from_euler_angles(0.1, -0.2, 0.7);
+    for position in &mut rows.positions {
+        *position = turn * *position + Vector3::new(0.8, -0.4, 0.1);
+    }
+    let verdict = judged(&bench, &estimate, &rows);
+    assert_eq!(verdict.named().map(|cause| cause.kind), Some(CauseKind::Base), "{verdict:?}");
 }
 
 #[test]
