@@ -85,8 +85,17 @@ pub(super) const MAX_STAND_INS: usize = 3;
 // The following constants concern rows that are left out.
 
 /// Maximum number of poses, each of which alone supports an effect, that are left out of the
-/// evidence.
-pub(super) const MAX_SINGLE_POSES: usize = 3;
+/// evidence, in tables of few poses.
+const MIN_SINGLE_POSES: usize = 3;
+/// Number of poses for each one that is left out for this reason; gross errors are rarer.
+const POSES_PER_SINGLE: usize = 10;
+
+/// Returns the maximum number of the evidence's `poses` that are left out because each alone
+/// supports an effect.
+pub(super) fn max_single_poses(poses: usize) -> usize {
+    (poses / POSES_PER_SINGLE).max(MIN_SINGLE_POSES)
+}
+
 /// Smallest squared distance |r|² of an outlier, in units of the variance of the other rows'
 /// coordinates: ten standard deviations. Effects displace single poses by less, wrong readings by
 /// more.

@@ -38,7 +38,7 @@ mod settling;
 mod sites;
 mod waves;
 
-use crate::select::settings::{MAX_SINGLE_POSES, MAX_STAND_INS};
+use crate::select::settings::{MAX_STAND_INS, max_single_poses};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -145,11 +145,11 @@ pub(super) fn best_form(
 /// Returns `None` if the residual is not finite (a pose without equilibrium), or if the search was
 /// stopped.
 pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
-    let mut left_out = Vec::new();
+    let (mut left_out, most) = (Vec::new(), max_single_poses(data.evidence_rows().len()));
     loop {
         let (evidence, hypotheses) = evaluate_without(fitted, data, added, &left_out)?;
         match single_supporting_pose(fitted, data, (&evidence, &hypotheses)) {
-            Some(pose) if left_out.len() < MAX_SINGLE_POSES => left_out.push(pose),
+            Some(pose) if left_out.len() < most => left_out.push(pose),
             _ => return Some(evidence),
         }
     }

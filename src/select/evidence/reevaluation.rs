@@ -102,9 +102,9 @@ impl<'a> Reevaluation<'a> {
     }
 
     /// Returns the index of the pose whose squared residual decreases most when `effect` is added
-    /// to all other members of the best set. The poses `left_out` are not used. Returns `None` if
-    /// the sets cannot be evaluated.
-    fn single_influential_pose(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
+    /// to all other members of the best set, and its share of the whole decrease. The poses
+    /// `left_out` are not used. Returns `None` if the sets cannot be evaluated.
+    fn single_influential_pose(&self, effect: &Effect, left_out: &[usize]) -> Option<(usize, f64)> {
         let (blocks, residual_model) = self.blocks(left_out)?;
         let products = Products::new(&blocks, &residual_model);
         let residual_of = |of: &dyn Fn(&Hypothesis) -> bool| {
@@ -116,12 +116,20 @@ impl<'a> Reevaluation<'a> {
         let gain = |pose: usize| {
             without.rows(3 * pose, 3).norm_squared() - with.rows(3 * pose, 3).norm_squared()
         };
-        (0..poses).max_by(|&a, &b| gain(a).total_cmp(&gain(b)))
+        let pose = (0..poses).max_by(|&a, &b| gain(a).total_cmp(&gain(b)))?;
+        Some((pose, gain(pose) / (without.norm_squared() - with.norm_squared())))
     }
 }
 
-/// Returns a pose that alone supports an effect with a searched argument: without the pose, the
-/// most probable set has no hypothesis at the effect's site. `None` if there is none.
+/// Smallest share of an effect's gain at which a single pose supports it, if the effect's site has
+/// other hypotheses too: more than all other poses together.
+const MIN_SINGLE_SHARE: f64 = 0.5;
+
+/// Returns a pose that alone supports an effect with a searched argument. `None` if there is none.
+///
+/// Without the pose, the most probable set has no hypothesis at the effect's site. Or it has fewer
+/// there, and the effect reduces the residual of this pose more than of all others: two changes in
+/// time that bracket a single pose, for example, fit its error, whatever it is.
 pub(super) fn single_supporting_pose(
     fitted: &Fitted,
     data: &Data,
@@ -140,10 +148,12 @@ pub(super) fn single_supporting_pose(
     }
     let reevaluation = Reevaluation::new(fitted, data, hypotheses, (evidence, best));
     let alone = |hypothesis: &Hypothesis| {
-        let pose =
+        let (pose, share) =
             reevaluation.single_influential_pose(hypothesis.effect()?, &evidence.left_out)?;
         let others = reevaluation.without(&[evidence.left_out.as_slice(), &[pose]].concat())?;
-        (!others.best().iter().any(|other| other.site == hypothesis.site)).then_some(pose)
+        let at_site = |of: &[Hypothesis]| of.iter().filter(|of| of.site == hypothesis.site).count();
+        let (left, all) = (at_site(others.best()), at_site(&best.hypotheses));
+        (left == 0 || left < all && share > MIN_SINGLE_SHARE).then_some(pose)
     };
     searched.into_iter().find_map(alone)
 }
