@@ -145,6 +145,7 @@ fn files_of_a_result_that_were_changed_are_not_believed() {
 #[test]
 fn changed_poses_are_said_and_newer_or_endless_numbers_refused() {
     let folder = Folder::with_lunar_sampler();
+    folder.copy("problems/lunar-sampler/TRUTH.toml", "TRUTH.toml");
     folder.flexcal("simulate . --truth . --poses 3 --seed 1 --quiet --out out").success();
     let again = "simulate . --truth . --data out/measurements.csv --seed 1 --out again";
     assert!(!folder.flexcal(again).success().stderr.contains("changed since"));
