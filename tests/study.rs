@@ -262,6 +262,13 @@ fn damaged_and_foreign_parts_are_not_used() {
     fs::remove_file(&one).unwrap();
     let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();
     assert_contains(&message, &["tally: changed since flexcal wrote it"]);
+    let unsealed = format!("{}}}", cell.split(",\n  \"digest\"").next().unwrap());
+    let newer = cell.replacen("\"version\": 2", "\"version\": 99", 1);
+    for (text, expected) in [(unsealed, "digest: changed since"), (newer, "format: version 99")] {
+        fs::write(&other, text).unwrap();
+        let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();
+        assert_contains(&message, &[expected]);
+    }
     fs::write(&other, cell).unwrap();
     fs::write(&one, "{").unwrap();
     assert_contains(&bench.flexcal("study STUDY.toml --out out").code(2).stderr, &["damaged"]);

@@ -103,11 +103,15 @@ pub fn watch_termination() {
         let mut signals = SigSet::empty();
         signals.add(Signal::SIGTERM);
         if signals.thread_block().is_ok() {
-            thread::spawn(move || {
+            let watch = move || {
                 while signals.wait().is_ok() {
                     end_early(TERMINATED_STATUS);
                 }
-            });
+            };
+            // Without a thread for it, the signal ends the process at once.
+            if thread::Builder::new().spawn(watch).is_err() {
+                _ = signals.thread_unblock();
+            }
         }
     });
 }
@@ -125,7 +129,9 @@ fn end_early(status: u8) {
         let _files = lock(&WRITE_LOCK);
         exit(i32::from(status));
     }
-    thread::spawn(end_in_time);
+    if thread::Builder::new().spawn(end_in_time).is_err() {
+        end_in_time();
+    }
 }
 
 /// Ends the process if the command has not ended in time after an interrupt.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::InputError;
-use crate::files::{read_limited, was_changed};
+use crate::files::{FORMAT_VERSION, Format, read_limited, was_changed};
 use crate::measurement::Measurements;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
@@ -35,6 +35,8 @@ pub enum ExplanationsError {
     Unreadable { file: PathBuf, source: io::Error },
     #[error("{}: not a loop.json: {source}", file.display())]
     Syntax { file: PathBuf, source: serde_json::Error },
+    #[error("{}: format: version {version}, and this program reads versions up to {FORMAT_VERSION}; use a newer flexcal, or run flexcal loop again", file.display())]
+    Newer { file: PathBuf, version: u32 },
     #[error("{}: changed since flexcal wrote it; run flexcal loop again", file.display())]
     Changed { file: PathBuf },
     #[error("{}: is of problem {found}, not of {expected}", file.display())]
@@ -50,6 +52,8 @@ pub enum ExplanationsError {
 
 #[derive(Deserialize)]
 struct Document {
+    #[serde(default)]
+    format: Format,
     problem: String,
     effects: Vec<Found>,
     #[serde(default)]
@@ -73,14 +77,18 @@ impl Explanations {
     /// Reads the loop.json of `problem`.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read, is no loop.json, was changed since flexcal wrote
-    /// it, or belongs to another problem.
+    /// Returns an error if the file cannot be read, is no loop.json or of a newer version, was
+    /// changed since flexcal wrote it, or belongs to another problem.
     pub fn read(file: &Path, problem: &Problem) -> Result<Self, ExplanationsError> {
         let named = || file.to_owned();
         let unreadable = |source| ExplanationsError::Unreadable { file: named(), source };
         let bytes = read_limited(file, MAX_FILE_MIB << 20).map_err(unreadable)?;
         let document: Document = serde_json::from_slice(&bytes)
             .map_err(|source| ExplanationsError::Syntax { file: named(), source })?;
+        let version = document.format.version;
+        if version > FORMAT_VERSION {
+            return Err(ExplanationsError::Newer { file: named(), version });
+        }
         if was_changed(file) {
             return Err(ExplanationsError::Changed { file: named() });
         }

@@ -35,6 +35,8 @@ pub enum WarningKind {
         gap: Option<String>,
         alike: Option<(usize, [String; 2])>,
     },
+    #[error("changed since flexcal wrote it; used all the same")]
+    FileChanged,
     #[error("not UTF-8 text; read as Windows-1252 (Latin-1), so check accented letters and signs")]
     ReadAsWindows1252,
     #[error(

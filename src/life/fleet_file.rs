@@ -102,8 +102,8 @@ impl FleetPrior {
         }
         if let Some((name, _)) = parameters.iter().find(|(_, entry)| !entry.is_usable()) {
             return Err(syntax(format!(
-                "{name}: mean, mean_error and spread are finite numbers, and the latter two are 0 or \
-                 more and not both 0"
+                "{name}: mean, mean_error and spread are numbers below {MAX_MAGNITUDE:e}, and the latter \
+                 two are 0 or more and not both 0"
             )));
         }
         let entry = |(name, entry): (String, Entry)| (name, (entry.mean, entry.sigma()));
@@ -113,8 +113,9 @@ impl FleetPrior {
     }
 }
 
-/// Largest magnitude of a number of a prior that is read.
-const MAX_MAGNITUDE: f64 = 1e100;
+/// Largest magnitude of a number of a prior that is read \[SI units\]; the errors of a fit with it
+/// stay finite.
+const MAX_MAGNITUDE: f64 = 1e9;
 
 impl Entry {
     /// Returns true if the numbers are finite and give a positive 1 σ.

@@ -11,7 +11,7 @@ use super::rows::RowsBuilder;
 use super::table::Table;
 use super::{ColumnTable, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
-use crate::files::same_file;
+use crate::files::{same_file, was_changed};
 use crate::problem::{JoinRule, Missing, Problem};
 
 impl Measurements {
@@ -106,6 +106,10 @@ impl Measurements {
                 file_error((file, files), problem, [named, InputErrorKind::GivenFileMissing])
             };
             tables.read(index, Table::open(file, &problem.data.dialect, missing)?)?;
+            if table_use == Use::Planned && was_changed(file) {
+                let (location, kind) = (Location::file(file), WarningKind::FileChanged);
+                tables.warnings.push(Warning { location, kind });
+            }
         }
         tables.finish()
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::definition::{Cell, Part, Study};
 use super::key::key;
 use super::tally::Tally;
-use crate::files::{Format, PROGRAM, changed_key, read_text, sealed, write_new};
+use crate::files::{FORMAT_VERSION, Format, PROGRAM, changed_key, read_text, sealed, write_new};
 
 /// Number of hexadecimal digits of the key that form the file name of a part.
 const NAME_DIGITS: usize = 16;
@@ -33,6 +33,8 @@ pub enum StoreError {
     Changed { path: PathBuf, key: String },
     #[error("the study has no cell {cell}; it has {cells}, counted from 0")]
     NoSuchCell { cell: usize, cells: usize },
+    #[error("{}: format: version {version}, and this program reads versions up to {FORMAT_VERSION}; use a newer flexcal, or delete it and its fits are done again", path.display())]
+    Newer { path: PathBuf, version: u32 },
     #[error("{}: belongs to other inputs; delete it and its fits are done again", path.display())]
     Foreign { path: PathBuf },
 }
@@ -44,9 +46,6 @@ impl Study {
         self.cells.get(part.cell).ok_or(none)
     }
 }
-
-/// Name of the format of finished parts, and its version.
-const FORMAT: (&str, u32) = ("flexcal-study-part", 1);
 
 /// Finished part with its statistics.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -85,7 +84,7 @@ impl FinishedPart {
             part.repetitions.end
         );
         Self {
-            format: Format { name: FORMAT.0.into(), version: FORMAT.1 },
+            format: Format::current("flexcal-study-part"),
             program: PROGRAM.to_owned(),
             part: what,
             key: key(study, part, cell),
@@ -135,6 +134,9 @@ impl Store {
             Err(source) => return Err(StoreError::Damaged { path, source }),
         };
         match changed_key(&text) {
+            _ if finished.format.version > FORMAT_VERSION => {
+                Err(StoreError::Newer { path, version: finished.format.version })
+            }
             Ok(Some(key)) => Err(StoreError::Changed { path, key }),
             _ if finished.key == key => Ok(Some(finished)),
             _ => Err(StoreError::Foreign { path }),

@@ -148,3 +148,12 @@ fn an_interrupted_loop_replaces_no_finished_one() {
         assert!(shown.contains("holds a finished loop, which stays"), "{shown}");
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_command_starts_where_no_thread_can_be_started() {
+    // No system has the memory for a stack of this size.
+    let mut command = Command::new(cargo_bin!("flexcal"));
+    let output = command.arg("man").env("RUST_MIN_STACK", "99999999999999").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}

@@ -143,6 +143,28 @@ fn files_of_a_result_that_were_changed_are_not_believed() {
 }
 
 #[test]
+fn changed_poses_are_said_and_newer_or_endless_numbers_refused() {
+    let folder = Folder::with_lunar_sampler();
+    folder.copy("problems/lunar-sampler/TRUTH.toml", "TRUTH.toml");
+    folder.flexcal("simulate . --truth . --poses 3 --seed 1 --quiet --out out").success();
+    let again = "simulate . --truth . --data out/measurements.csv --seed 1 --out again";
+    assert!(!folder.flexcal(again).success().stderr.contains("changed since"));
+    folder.write("out/measurements.csv", folder.read("out/measurements.csv") + "\n");
+    let run = folder.flexcal(again).success();
+    assert_contains(&run.stderr, &["out/measurements.csv: changed since flexcal wrote it; used"]);
+    let format = "\"format\": {\"name\": \"flexcal-loop\", \"version\": 99}";
+    let newer = format!("{{{format}, \"problem\": \"lunar-sampler\", \"effects\": []}}");
+    folder.write("loop.json", newer);
+    let run = folder.flexcal("next . --truth . --for causes --explanations loop.json").code(2);
+    assert_contains(&run.stderr, &["loop.json: format: version 99"]);
+    let head = "format = \"flexcal-prior\"\nversion = 1\nproblem = \"lunar-sampler\"\narms = 3\n";
+    let parameter = "\"joint3.d\" = { mean = 9e18, mean_error = 1.0, spread = 1.0 }\n";
+    folder.write("PRIOR.toml", format!("{head}[arm_parts]\n[parameters]\n{parameter}"));
+    let run = folder.flexcal("identify . --prior PRIOR.toml").code(2);
+    assert_contains(&run.stderr, &["joint3.d", "numbers below 1e9"]);
+}
+
+#[test]
 fn an_estimate_that_was_changed_is_refused_or_said() {
     const ESTIMATE: &str = "out/estimate.json";
     let folder = Folder::with_lunar_sampler();
