@@ -195,7 +195,6 @@ fn of_other_rows(fit: &CheckedFit, before: f64) -> Option<Finding> {
         other_rows(fit, &joints)?;
     let rows = fit.fitting.measurements;
     let names: Vec<String> = found.iter().map(|&joint| column_name(rows, joint)).collect();
-    let error = format_error("position", before, 1);
     // A sorted column of a joint that moves the target most hides the others.
     let sorted: Vec<usize> =
         joints.iter().copied().filter(|&joint| is_sorted(&commands(rows, joint))).collect();
@@ -206,16 +205,15 @@ fn of_other_rows(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let (text, remedy) = if names.len() == joints.len() {
         let text = format!(
             "the positions do not depend on the joint angles of their rows (R² of their distances is \
-             {measured:.2}, with the positions of the nominal arm {predicted:.2}), and the fitted arm \
-             misses them by {error}: the rows of the positions are in another order than those of the \
-             joint angles, or of other poses"
+             {measured:.2}, with the positions of the nominal arm {predicted:.2}): the rows of the \
+             positions are in another order than those of the joint angles, or of other poses"
         );
         (text, "join positions and joint angles again, by the name or the time of each row")
     } else {
         let text = format!(
-            "the positions do not depend on the column {}, those of the nominal arm do, and the fitted \
-             arm misses the measurements by {error}: the column is in another order than the other \
-             columns, as one that was sorted by itself, or of other poses",
+            "the positions do not depend on the column {}, but those of the nominal arm do: the column \
+             is in another order than the other columns, as one that was sorted by itself, or of other \
+             poses",
             names.join(", ")
         );
         (text, "copy the column again, with all columns of a row together")

@@ -21,8 +21,8 @@ const ORDERS: u64 = 99;
 /// Seed of these orders.
 const SEED: u64 = 1;
 /// Number of random orders with a larger R² at which measured positions do not depend on joints:
-/// one of ten tables without any dependence has fewer.
-const MIN_LARGER: usize = 10;
+/// three of a hundred tables without any dependence have fewer.
+const MIN_LARGER: usize = 3;
 /// Smallest ratio of R² of the positions that the nominal arm predicts to the largest R² of a random
 /// order, at which a dependence would be seen.
 const MIN_RATIO: f64 = 1.5;
