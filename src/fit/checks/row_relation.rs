@@ -54,7 +54,9 @@ pub(super) fn other_rows(fit: &CheckedFit, joints: &[usize]) -> Option<OtherRows
         return None;
     }
     let poses = fit.fitting.poses(&rows);
-    let predicted = fit.fitting.model.predicted_targets(&poses, fit.registered_x.as_slice());
+    // Fitted to other rows, a free target would move to where joints have no effect.
+    let nominal = fit.fitting.located();
+    let predicted = fit.fitting.model.predicted_targets(&poses, nominal.as_slice());
     let measured: Vec<Vector3<f64>> = rows.iter().map(|&row| measurements.positions[row]).collect();
     let is_turning = |joint: usize| fit.problem.joints[joint].command_kind() == JointKind::Revolute;
     // Distances between rows of different bases depend on where these stand.
