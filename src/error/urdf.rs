@@ -43,8 +43,9 @@ pub enum UrdfErrorKind {
     #[error("the axis has no direction")]
     NoAxis,
     #[error(
-        "a joint of type \"{kind}\" is not supported; supported types: revolute, continuous, \
-         prismatic, fixed; choose a chain without it with --base and --tip"
+        "a joint of type \"{kind}\" is not supported{}; supported types: revolute, continuous, \
+         prismatic, fixed; choose a chain without it with --base and --tip",
+        suggestion(kind, &["revolute", "continuous", "prismatic", "fixed"])
     )]
     Kind { kind: String },
     #[error(

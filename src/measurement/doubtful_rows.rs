@@ -2,7 +2,7 @@
 //! lost its target, a pixel outside its image, intrinsics of another resolution, and session names
 //! that are written in two ways.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Measurements;
 use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
@@ -81,12 +81,13 @@ impl Measurements {
     /// far beyond twice its declared centre along both axes, as images of a higher resolution do.
     fn other_resolution(&self, problem: &Problem) -> Option<Warning> {
         let mut farthest = BTreeMap::new();
+        let mut centred = BTreeSet::new();
         for row in 0..self.len() {
             let Observation::Pixel(camera, ..) = self.observation(row) else { continue };
             let pixel = self.positions.get(row)?;
             // Pixels with negative numbers do not count from a corner of the image.
             if pixel.x < 0.0 || pixel.y < 0.0 {
-                return None;
+                centred.insert(camera);
             }
             let (reach, at): &mut ([f64; 2], usize) = farthest.entry(camera).or_default();
             let [x, y] = reach;
@@ -95,6 +96,7 @@ impl Measurements {
             }
             (*x, *y) = (x.max(pixel.x), y.max(pixel.y));
         }
+        farthest.retain(|camera, _| !centred.contains(camera));
         farthest.into_iter().find_map(|(camera, (reach, row))| {
             let fixture = problem.fixtures.get(camera as usize)?;
             let place = fixture.kind.fields().iter().position(|field| *field == "cx")?;

@@ -262,7 +262,7 @@ fn what_may_have_been_misread_is_said() {
     let mirrored = with(&|_, data| {
         data.measurements.positions.iter_mut().for_each(|position| position.swap_rows(0, 2));
     });
-    assert_eq!(mirrored, [Misreading::Mirrored.to_string()]);
+    assert_eq!(mirrored, [Misreading::Mirrored { axes: None }.to_string()]);
     let reversed = with(&|_, data| {
         data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q);
     });

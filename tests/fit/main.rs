@@ -17,6 +17,7 @@ mod held;
 mod identified;
 mod judged;
 mod masses;
+mod misread;
 mod orientation;
 mod recovery;
 mod remainder;

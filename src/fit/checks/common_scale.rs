@@ -13,10 +13,18 @@ use crate::quantity::Unit;
 
 /// Smallest relative error of the scale that is reported. Instruments and thermal expansion are
 /// wrong by less (23 ppm/K for aluminium), and effects of the catalogue describe these.
-const MIN_SCALE_ERROR: f64 = 3e-3;
+pub(super) const MIN_SCALE_ERROR: f64 = 3e-3;
 /// Smallest score, in standard deviations, that the lengths without the most informative one
 /// support. A single wrong length is no common factor.
 const MIN_SIGMAS_OF_OTHERS: f64 = 3.0;
+
+/// Relative error of the scale above which no instrument and no temperature is its cause. For such
+/// an error, a wrong unit, scale factor or joint table is likely beforehand, so that smaller scores
+/// count: [`MIN_GROSS_SIGMAS`] of all lengths and [`MIN_GROSS_SIGMAS_OF_OTHERS`] of the lengths
+/// without the most informative one.
+const MIN_GROSS_ERROR: f64 = 1e-2;
+const MIN_GROSS_SIGMAS: f64 = 3.5;
+const MIN_GROSS_SIGMAS_OF_OTHERS: f64 = 2.5;
 
 /// Largest scatter of the lengths about the common factor, beyond that of their priors and relative
 /// to what the factor explains, at which they deviate in proportion.
@@ -188,9 +196,14 @@ impl CommonFactor {
     /// Returns true if the factor is far beyond what the priors allow, more than one length
     /// supports it, and the lengths deviate in proportion.
     fn is_clear(&self) -> bool {
+        let (least, of_others) = if self.error.abs() > MIN_GROSS_ERROR {
+            (MIN_GROSS_SIGMAS, MIN_GROSS_SIGMAS_OF_OTHERS)
+        } else {
+            (MAX_PRIOR_SIGMAS, MIN_SIGMAS_OF_OTHERS)
+        };
         self.error.abs() > MIN_SCALE_ERROR
-            && self.score.abs() > MAX_PRIOR_SIGMAS
-            && self.others * self.error.signum() > MIN_SIGMAS_OF_OTHERS
+            && self.score.abs() > least
+            && self.others * self.error.signum() > of_others
             && self.unexplained < MAX_UNEXPLAINED
     }
 }

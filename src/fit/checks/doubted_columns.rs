@@ -8,6 +8,7 @@ use super::finding::{Finding, FindingCode};
 use super::followed_commands::{Unrelated, unrelated};
 use super::misfit::Misfit;
 use super::row_kind::format_error;
+use super::row_relation::{OtherRows, other_rows};
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::{Measurements, Split};
 use crate::problem::JointKind;
@@ -40,7 +41,8 @@ impl Check for ColumnsHoldMeasurements {
         let found = filled_or_frozen(fit, before)
             .or_else(|| unrelated_to_positions(fit, before))
             .or_else(|| standing_still(fit, before))
-            .or_else(|| sorted_by_itself(fit, before));
+            .or_else(|| sorted_by_itself(fit, before))
+            .or_else(|| of_other_rows(fit, before));
         found.into_iter().collect()
     }
 }
@@ -157,14 +159,16 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
     Some(finding(&[name], before, Some(after), text))
 }
 
+/// Returns true if values rise, or fall, from the first to the last.
+fn is_sorted(values: &[f64]) -> bool {
+    let mut steps = values.windows(2).map(|pair| pair[1] - pair[0]);
+    let is_constant = values.first() == values.last();
+    !is_constant && (steps.clone().all(|step| step >= 0.0) || steps.all(|step| step <= 0.0))
+}
+
 /// Reports a coordinate that rises or falls from row to row in the whole table while no other does.
 fn sorted_by_itself(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let rows = fit.fitting.measurements;
-    let is_sorted = |values: &[f64]| {
-        let mut steps = values.windows(2).map(|pair| pair[1] - pair[0]);
-        let is_constant = values.first() == values.last();
-        !is_constant && (steps.clone().all(|step| step >= 0.0) || steps.all(|step| step <= 0.0))
-    };
     let axis = |axis: usize| rows.positions.iter().map(|x| x[axis]).collect::<Vec<f64>>();
     let sorted: Vec<usize> = (0..3).filter(|&k| is_sorted(&axis(k))).collect();
     let &[only] = sorted.as_slice() else { return None };
@@ -179,6 +183,42 @@ fn sorted_by_itself(fit: &CheckedFit, before: f64) -> Option<Finding> {
         format_error("position", before, 1)
     );
     Some(finding(&[name], before, None, text))
+}
+
+/// Reports joint columns on which the positions do not depend at all.
+fn of_other_rows(fit: &CheckedFit, before: f64) -> Option<Finding> {
+    if !fit.has_further_fits || !fit.explanations().fitted.is_empty() {
+        return None;
+    }
+    let joints: Vec<usize> = moving(fit).collect();
+    let OtherRows { joints: found, determination: [measured, predicted] } =
+        other_rows(fit, &joints)?;
+    let rows = fit.fitting.measurements;
+    let names: Vec<String> = found.iter().map(|&joint| column_name(rows, joint)).collect();
+    // A sorted column of a joint that moves the target most hides the others.
+    let sorted: Vec<usize> =
+        joints.iter().copied().filter(|&joint| is_sorted(&commands(rows, joint))).collect();
+    let names = match sorted.as_slice() {
+        &[only] => vec![column_name(rows, only)],
+        _ => names,
+    };
+    let (text, remedy) = if names.len() == joints.len() {
+        let text = format!(
+            "the positions do not depend on the joint angles of their rows (R² of their distances is \
+             {measured:.2}, with the positions of the nominal arm {predicted:.2}): the rows of the \
+             positions are in another order than those of the joint angles, or of other poses"
+        );
+        (text, "join positions and joint angles again, by the name or the time of each row")
+    } else {
+        let text = format!(
+            "the positions do not depend on the column {}, but those of the nominal arm do: the column \
+             is in another order than the other columns, as one that was sorted by itself, or of other \
+             poses",
+            names.join(", ")
+        );
+        (text, "copy the column again, with all columns of a row together")
+    };
+    Some(finding(&names, before, None, text).with_remedy(remedy.to_owned()))
 }
 
 /// Creates the finding about doubted columns.

@@ -116,7 +116,8 @@ finding_codes! {
         "check axes of the measuring frame, signs of joints, units, and the prior";
     ScaleContradicted: Error "scale-contradicted" ["error", "sigmas", "lengths"]
         "All fitted lengths of the arm together deviate from nominal by one factor, more than \
-         0.3 % and more than 5 standard deviations beyond their priors.",
+         0.3 % and more than 5 standard deviations beyond their priors, or more than 1 % and 3.5 \
+         standard deviations.",
         "check the lengths that scale the measurements, or the joint table";
     BeyondArmSize: Error "beyond-arm-size" ["parameter", "sizes"]
         "A parameter deviates by more than the size of the arm, half a turn, or a factor of 100.",

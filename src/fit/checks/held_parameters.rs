@@ -9,7 +9,7 @@ use super::row_kind::format_error;
 use crate::fit::Noise;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::least_squares::jacobian_and_residual;
-use crate::model::parameter::Parameter;
+use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Observation, ParameterRule, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number};
@@ -19,6 +19,11 @@ use crate::quantity::format::{decimals, number};
 const MIN_EXPLAINED_SHARE: f64 = 0.8;
 /// Smallest share that the linearised fit must promise, at which the parameter is fitted in full.
 const MIN_EXPECTED_SHARE: f64 = 0.5;
+/// Smallest share that a held base takes away if it is free and no single parameter explains the
+/// misfit. A base is seldom known as well as the geometry, so that it is named beside other causes.
+const MIN_SHARE_OF_BASE: f64 = 0.5;
+/// Pattern of the parameters of the base.
+const BASE: &str = "base.*";
 /// Maximum number of held parameters that are fitted in full, each by itself: those with the
 /// largest expected share.
 const MAX_FITTED: usize = 3;
@@ -92,12 +97,20 @@ impl Trial {
 
 /// Returns the finding that names the held parameter which explains most of the misfit.
 fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
-    let names = promising(fit).filter(|names| !names.is_empty())?;
+    let names = promising(fit).unwrap_or_default();
+    let may_move = !fit.is_base_free();
+    if names.is_empty() && !may_move {
+        return None;
+    }
     let rows = fit.kind(leading).rows;
     // All fits have the declared σ, so that the priors weigh equally.
     let refit = |problem: &Problem, name: Option<&str>| {
         fit.with_problem(problem, |fitting| {
             let end = fitting.run(&fitting.registered().ok()?).ok()?;
+            if name == Some(BASE) {
+                let moved = (shown_base(fitting, &end), "free = true");
+                return Some((Some(moved), Trial::of(fit, &rows, (fitting, &end))));
+            }
             let mut parameters = fitting.model.parameters.iter().zip(end.x.iter());
             let freed = parameters.find(|(parameter, _)| Some(parameter.name.as_str()) == name);
             let freed = freed.map(|(parameter, x)| (shown(parameter, *x), prior(parameter, *x)));
@@ -108,7 +121,7 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
     let noise =
         fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x)).powi(2) / fit.noise_factor;
     let misfit = (declared.rms.powi(2) - noise).max(0.0);
-    let limit = (1.0 - MIN_EXPLAINED_SHARE).mul_add(misfit, noise);
+    let limit = |share: f64| (1.0 - share).mul_add(misfit, noise);
     let fitted = |name: &String| {
         let problem = with_free(fit.problem, [name.clone()]);
         let (freed, trial) = refit(&problem, Some(name))?;
@@ -116,9 +129,14 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
         Some(Freed { name: name.clone(), deviation, freedom, trial })
     };
     let mut freed: Vec<Freed> = names.iter().filter_map(fitted).collect();
-    freed.retain(|freed| {
-        freed.trial.rms.powi(2) <= limit && freed.trial.left_out < declared.left_out
-    });
+    let is_better = |trial: &Trial, share| {
+        trial.rms.powi(2) <= limit(share) && trial.left_out < declared.left_out
+    };
+    freed.retain(|freed| is_better(&freed.trial, MIN_EXPLAINED_SHARE));
+    if freed.is_empty() && may_move {
+        let base = fitted(&BASE.to_owned());
+        freed.extend(base.filter(|base| is_better(&base.trial, MIN_SHARE_OF_BASE)));
+    }
     freed.sort_by(|a, b| a.trial.left_out.total_cmp(&b.trial.left_out));
     let best = freed.first()?;
     let is_alike = |other: &&Freed| other.trial.left_out <= MAX_RATIO_ALIKE * best.trial.left_out;
@@ -143,6 +161,18 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
     };
     let numbers = [json!(best.name), json!(alike), declared.rms.into(), best.trial.rms.into()];
     Some(Finding::new(FindingCode::HeldParameter, numbers, text).with_remedy(remedy))
+}
+
+/// Returns how far the base moved in a fit.
+fn shown_base(fitting: &Fitting, end: &FitEnd) -> String {
+    let mut moved = [0.0_f64; 2];
+    for (parameter, x) in fitting.model.parameters.iter().zip(&end.x) {
+        if let ParameterSite::Base { axis, .. } = parameter.site {
+            moved[usize::from(axis >= 3)] += x * x;
+        }
+    }
+    let [shift, turn] = moved.map(f64::sqrt);
+    format!("{:.3} mm and {:.4}°", shift * 1e3, turn.to_degrees())
 }
 
 /// Returns the pattern of the base or the tool if it is held and acts as the named parameter does:

@@ -34,6 +34,7 @@ mod prediction;
 pub(super) mod priors;
 pub(super) mod required_columns;
 pub(super) mod row_kind;
+mod row_relation;
 mod row_steps;
 pub(super) mod set_aside;
 mod table_digits;

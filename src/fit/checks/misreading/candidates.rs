@@ -33,8 +33,15 @@ pub(super) const MAX_OTHER_CARRIERS: usize = 2;
 const ZERO_POSITION_STEP: i16 = 15;
 /// Trial ratios of the motion of a joint to its command, in hundredths. A full fit finds values
 /// between them.
-const TRIAL_RATIOS: [i16; 18] =
-    [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 110, 125, 150, 200, 300, 400, 500, 1000];
+/// The last one is that of degrees to radians.
+const TRIAL_RATIOS: [i16; 21] =
+    [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 97, 103, 110, 125, 150, 200, 300, 400, 500, 1000, 5730];
+/// Trial ratios of the measured lengths to those of the arm, in hundredths. A full fit finds values
+/// between them.
+const TRIAL_SCALES: [i16; 8] = [80, 90, 95, 98, 102, 105, 110, 125];
+/// Units of angles that are taken for degrees, in hundredths of a degree: gradians, tenths and
+/// hundredths of a degree.
+const TURN_UNITS: [i16; 3] = [90, 10, 1];
 /// Usual leads of ball screws \[mm\]. A full fit finds values near them.
 const SCREW_LEADS: [i16; 12] = [4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 40, 50];
 /// Trial errors of an angle α of the joint table \[°\]. For α = ±90°, an error of 180° is the same
@@ -59,7 +66,9 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     let mut units = Vec::new();
     units.extend(turns(true).then_some(Misreading::Degrees));
     units.extend(turns(false).then_some(Misreading::Radians));
-    units.extend(turns(false).then_some(Misreading::Gradians));
+    if turns(false) {
+        units.extend(TURN_UNITS.map(|hundredths| Misreading::TurnUnit { hundredths }));
+    }
     units.extend(of_slides(problem, table));
     units.extend(lengths(false).then_some(Misreading::Metres));
     units.extend(lengths(true).then_some(Misreading::Millimetres));
@@ -70,7 +79,8 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     if lengths(false) {
         units.extend((0..3).map(|axis| Misreading::AxisInches { axis }));
     }
-    units.push(Misreading::Mirrored);
+    units.push(Misreading::Mirrored { axes: None });
+    units.extend(TRIAL_SCALES.map(|percent| Misreading::Scale { percent }));
     units.extend(table.orientations.is_some().then_some(Misreading::InversePose));
     units.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
     units.extend(long.then_some(Misreading::ArmInMillimetres));

@@ -31,8 +31,12 @@ pub enum Misreading {
     Degrees,
     /// Joint angles are in radians, declared as degrees.
     Radians,
-    /// Joint angles are in gradians (400 to a turn), declared as degrees.
-    Gradians,
+    /// Joint angles are in another unit, declared as degrees: gradians (400 to a turn), tenths or
+    /// hundredths of a degree.
+    TurnUnit {
+        /// One unit of the numbers in hundredths of a degree.
+        hundredths: i16,
+    },
     /// Coordinates of sliding joints are in another unit.
     Slides {
         /// Exponent of the power of ten by which the coordinates must be multiplied.
@@ -44,9 +48,19 @@ pub enum Misreading {
     Millimetres,
     /// Positions are in inches, declared as millimetres.
     Inches,
+    /// All positions are longer or shorter by one factor, because the instrument or the joint table
+    /// has a wrong scale.
+    Scale {
+        /// Ratio of the measured lengths to those of the arm, in hundredths.
+        percent: i16,
+    },
     /// Positions are in a left-handed frame: two coordinates are exchanged, or one has the wrong
     /// sign.
-    Mirrored,
+    Mirrored {
+        /// The two exchanged coordinates, 0…2 for x, y, z, or twice the one with the wrong sign;
+        /// `None` if the free base makes all alike.
+        axes: Option<[usize; 2]>,
+    },
     /// The measured angles of some joints have the opposite sign.
     Reversed {
         /// Set of joints as bits: bit k (from 0) is set for joint k + 1.
@@ -339,6 +353,7 @@ impl Misreading {
             Self::Mounted { fixture, frame: with } | Self::ExchangedMounts { fixture, with } => {
                 (fixture, with, None)
             }
+            Self::TurnUnit { hundredths } => (hundredths.unsigned_abs().into(), 0, None),
             Self::AxisUnit { axis, .. } | Self::AxisInches { axis } => (axis, 0, None),
             Self::ExchangedRows { row } => (row, 0, None),
             Self::ExchangedLengths { joint, field, with, other } => {

@@ -12,6 +12,7 @@ use super::explanation::{Explanation, Explanations, LeftOutMisfit};
 use super::images::of_images;
 use super::undo::is_unit_ratio;
 use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::common_scale::MIN_SCALE_ERROR;
 use crate::fit::checks::nominal_error::is_nominal_far_off;
 use crate::fit::checks::parameter_limits::{MAX_PRIOR_SIGMAS, is_of_arm, prior_sigmas};
 use crate::fit::stages::fitting::{FitEnd, Fitting};
@@ -126,6 +127,12 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     let mut tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
     if measurements.leading().kind() == Observation::Pixel(0, 0, 0).kind() {
         tested.extend(of_images(fit.problem));
+    }
+    let mirrored = Misreading::Mirrored { axes: None };
+    if !fit.is_base_free() && tested.contains(&mirrored) {
+        tested.retain(|misreading| *misreading != mirrored);
+        let pairs = (0..3).flat_map(|first| (first..3).map(move |second| [first, second]));
+        tested.extend(pairs.map(|axes| Misreading::Mirrored { axes: Some(axes) }));
     }
     // A base that is only a little off is no misreading.
     let is_base_held = is_position && !fit.is_base_free() && is_nominal_far_off(fit);
@@ -257,6 +264,7 @@ impl<'a> Trial<'a> {
                     let is_still = size * self.commanded_range(joint - 1) < MIN_MOTION;
                     is_still && !is_unit_ratio(size) || (size - 1.0).abs() < MIN_RATIO_ERROR
                 }
+                Misreading::Scale { .. } => (size - 1.0).abs() < MIN_SCALE_ERROR,
                 Misreading::Screw { .. } => !SCREW_LEAD_RANGE.contains(&(TAU / size.abs())),
                 _ => false,
             };

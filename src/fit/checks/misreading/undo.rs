@@ -23,9 +23,6 @@ const UNIT_RATIOS: [f64; 4] = [PI / 180.0, 180.0 / PI, 1e-3, 1e3];
 /// in another unit; gear errors are smaller.
 const UNIT_RATIO_TOLERANCE: f64 = 0.05;
 
-/// One gradian in degrees.
-const DEGREES_PER_GRADIAN: f64 = 0.9;
-
 /// Returns true if a ratio of motion to command is that of two units, see [`UNIT_RATIOS`].
 pub(super) fn is_unit_ratio(size: f64) -> bool {
     UNIT_RATIOS.iter().any(|ratio| (size / ratio - 1.0).abs() < UNIT_RATIO_TOLERANCE)
@@ -214,6 +211,7 @@ impl Misreading {
     fn effect(self) -> Option<Effect> {
         match self {
             Self::Ratio { joint, .. } => Some(Effect::GearRatio { joint }),
+            Self::Scale { .. } => Some(Effect::TrackerScale),
             Self::Coupled { joint, from, .. } | Self::Screw { joint, from, .. } => {
                 Some(Effect::JointCoupling { joint, from })
             }
@@ -227,6 +225,7 @@ impl Misreading {
     pub(super) fn expressed(self, size: f64) -> Option<(Effect, f64)> {
         let effect = self.effect()?;
         match effect {
+            Effect::TrackerScale => Some((effect, size - 1.0)),
             Effect::GearRatio { .. } => (!is_unit_ratio(size)).then_some((effect, size - 1.0)),
             _ => Some((effect, size)),
         }
@@ -239,6 +238,9 @@ impl Misreading {
             Self::Ratio { joint, percent } => {
                 let name = format!("gear-ratio[{joint}].error");
                 Some((name, f64::from(percent) / 100.0 * (1.0 + x)))
+            }
+            Self::Scale { percent } => {
+                Some(("tracker-scale.error".to_owned(), f64::from(percent) / 100.0 * (1.0 + x)))
             }
             Self::Coupled { joint, from, is_opposite } => {
                 let name = format!("joint-coupling[{joint},{from}].factor");
@@ -302,8 +304,16 @@ impl Misreading {
             Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
             Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
             Self::Inches => rows.positions.iter_mut().for_each(|position| *position *= MM_PER_INCH),
-            Self::Mirrored => {
-                rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
+            Self::Scale { percent } => {
+                rows.positions.iter_mut().for_each(|at| *at *= 100.0 / f64::from(percent));
+            }
+            Self::Mirrored { axes } => {
+                let [first, second] = axes.unwrap_or([0, 1]);
+                let sign = if first == second { -1.0 } else { 1.0 };
+                for position in &mut rows.positions {
+                    position.swap_rows(first, second);
+                    position[first] *= sign;
+                }
             }
             Self::InversePose => {
                 let turns = rows.orientations.iter_mut().flatten();
@@ -332,9 +342,7 @@ impl Misreading {
                 }
             }
             Self::AxisUnit { axis, power } => {
-                rows.positions
-                    .iter_mut()
-                    .for_each(|position| position[axis] *= power_of_ten(power));
+                rows.positions.iter_mut().for_each(|at| at[axis] *= power_of_ten(power));
             }
             Self::AxisInches { axis } => {
                 rows.positions.iter_mut().for_each(|position| position[axis] *= MM_PER_INCH);
@@ -373,9 +381,12 @@ impl Misreading {
     /// Corrects the misreading in a configuration `q` of `table`.
     fn undo_command(self, q: &mut [f64], problem: &Problem, table: &Measurements) {
         match self {
-            Self::Degrees | Self::Radians => {
-                let is_radians = self == Self::Degrees;
-                let factor = if is_radians { PI / 180.0 } else { 180.0 / PI };
+            Self::Degrees | Self::Radians | Self::TurnUnit { .. } => {
+                let (factor, is_radians) = match self {
+                    Self::Degrees => (PI / 180.0, true),
+                    Self::TurnUnit { hundredths } => (f64::from(hundredths) / 100.0, false),
+                    _ => (180.0 / PI, false),
+                };
                 let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, is_radians));
                 turning.for_each(|joint| q[joint] *= factor);
             }
@@ -385,10 +396,6 @@ impl Misreading {
                     kind == Some(JointKind::Prismatic)
                 };
                 (0..q.len()).filter(slides).for_each(|joint| q[joint] *= power_of_ten(power));
-            }
-            Self::Gradians => {
-                let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, false));
-                turning.for_each(|joint| q[joint] *= DEGREES_PER_GRADIAN);
             }
             Self::OppositeOrder | Self::Rotated { .. } => {
                 let commanded: Vec<usize> = (0..q.len().min(problem.joints.len()))
@@ -440,15 +447,11 @@ fn exchange_joint_rows(first: &mut Joint, second: &mut Joint) -> Option<()> {
     if row(first) == row(second) || !has_row(first) || !has_row(second) {
         return None;
     }
-    for (one, other) in [
-        (&mut first.alpha, &mut second.alpha),
-        (&mut first.a, &mut second.a),
-        (&mut first.theta, &mut second.theta),
-        (&mut first.d, &mut second.d),
-        (&mut first.beta, &mut second.beta),
-    ] {
-        std::mem::swap(one, other);
-    }
+    std::mem::swap(&mut first.alpha, &mut second.alpha);
+    std::mem::swap(&mut first.a, &mut second.a);
+    std::mem::swap(&mut first.theta, &mut second.theta);
+    std::mem::swap(&mut first.d, &mut second.d);
+    std::mem::swap(&mut first.beta, &mut second.beta);
     Some(())
 }
 

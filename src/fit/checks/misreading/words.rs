@@ -43,6 +43,10 @@ impl Misreading {
                 let unit = unit_of_ratio(size, kind);
                 format!("joint {joint} that {moves} by {size:.4} times its command{unit}")
             }
+            (Self::Scale { .. }, Some(size)) => format!(
+                "positions that are {size:.4} times as large as the lengths of the joint table say \
+                 (scale factor of the instrument, or a joint table of another size of this arm)"
+            ),
             (Self::Screw { joint, from, .. }, Some(size)) => format!(
                 "joint {joint} that also turns by {:.3}°/mm of joint {from} (as a ball screw does; declare joint-coupling)",
                 size.to_degrees() * 1e-3
@@ -183,7 +187,18 @@ impl fmt::Display for Misreading {
         match *self {
             Self::Degrees => f.write_str("joint angles that are degrees, declared as radians"),
             Self::Radians => f.write_str("joint angles that are radians, declared as degrees"),
-            Self::Gradians => f.write_str("joint angles that are gradians, declared as degrees"),
+            Self::TurnUnit { hundredths } => {
+                let unit = match hundredths {
+                    90 => "gradians",
+                    10 => "tenths of a degree",
+                    _ => "hundredths of a degree",
+                };
+                write!(f, "joint angles that are {unit}, declared as degrees")
+            }
+            Self::Scale { .. } => f.write_str(
+                "positions on another scale than the joint table (unit or scale factor of the \
+                 instrument, or a joint table of another size of this arm)",
+            ),
             Self::OppositeOrder => f.write_str("columns of all joints in the opposite order"),
             Self::Alphabetical => f.write_str(
                 "columns of all joints in the alphabetical order of the joints' names (as in ROS \
@@ -205,8 +220,16 @@ impl fmt::Display for Misreading {
             Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
             Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
             Self::Inches => f.write_str("positions that are inches, declared as millimetres"),
-            Self::Mirrored => {
+            Self::Mirrored { axes: None } => {
                 f.write_str("two of x, y and z that are exchanged, or one of the other sign")
+            }
+            Self::Mirrored { axes: Some([first, second]) } => {
+                let [one, other] = [first, second].map(|axis| ['x', 'y', 'z'][axis]);
+                if first == second {
+                    write!(f, "{one} of the positions that has the other sign")
+                } else {
+                    write!(f, "{one} and {other} of the positions that are exchanged")
+                }
             }
             Self::Reversed { joints } => {
                 let numbers: Vec<String> =

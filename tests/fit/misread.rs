@@ -1,0 +1,129 @@
+//! Misreadings of a table, of the target and of lengths are named, and sound tables are not.
+
+use flexcal::fit::FindingCode;
+use flexcal::measurement::Dataset;
+use flexcal::problem::Problem;
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::common::arms::parse;
+use crate::common::made::fit_as_command;
+use crate::judged::{PRIORS, measured, text};
+
+/// Returns the arm of [`crate::judged`] with a free base, and its measurements.
+fn arm() -> (Problem, Dataset) {
+    let problem = parse(&text(&format!("{PRIORS}\n'base.*' = {{ free = true }}")));
+    let data = measured(&problem, 8);
+    (problem, data)
+}
+
+/// Fits a problem to a table and returns the text of the finding with this code.
+fn named(problem: &Problem, data: &Dataset, code: FindingCode) -> String {
+    let found = fit_as_command(problem, data);
+    assert!(!found.is_trusted(), "{:?}", found.findings);
+    let finding = found.finding(code).unwrap_or_else(|| panic!("{:?}", found.findings));
+    finding.to_string()
+}
+
+#[test]
+fn a_scale_of_all_positions_is_named() {
+    let (problem, clean) = arm();
+    for scale in [1.05, 0.93] {
+        let mut data = clean.clone();
+        data.measurements.positions.iter_mut().for_each(|position| *position *= scale);
+        let found = fit_as_command(&problem, &data);
+        let codes = [FindingCode::Misread, FindingCode::ScaleContradicted];
+        let texts = codes.map(|code| found.finding(code).map(ToString::to_string));
+        let texts = texts.map(Option::unwrap_or_default);
+        assert!(!found.is_trusted(), "{:?}", found.findings);
+        let is_scale = |text: &String| {
+            text.contains(&format!("{scale:.2}")) && (text.contains("as large as the lengths"))
+                || text.contains("a common factor")
+        };
+        assert!(texts.iter().any(is_scale), "{texts:?}");
+    }
+}
+
+#[test]
+fn tenths_of_degrees_are_named() {
+    let (problem, mut data) = arm();
+    data.measurements.configurations.iter_mut().for_each(|q| *q *= 10.0);
+    let words = named(&problem, &data, FindingCode::Misread);
+    assert!(words.contains("joint angles that are tenths of a degree"), "{words}");
+}
+
+#[test]
+fn coordinates_are_told_apart_where_the_base_is_held() {
+    let problem = parse(&text(PRIORS));
+    let clean = measured(&problem, 8);
+    let mistakes: [(fn(&mut Vector3<f64>), &str); 2] = [
+        (|at| at.y = -at.y, "y of the positions that has the other sign"),
+        (|at| at.swap_rows(0, 1), "x and y of the positions that are exchanged"),
+    ];
+    for (mistake, expected) in mistakes {
+        let mut data = clean.clone();
+        data.measurements.positions.iter_mut().for_each(mistake);
+        let words = named(&problem, &data, FindingCode::Misread);
+        assert!(words.contains(expected), "{words}");
+    }
+}
+
+#[test]
+fn reversed_rows_are_named_and_shuffled_ones_do_not_depend_on_their_joints() {
+    let (problem, clean) = arm();
+    let mut data = clean.clone();
+    data.measurements.positions.reverse();
+    let words = named(&problem, &data, FindingCode::Misread);
+    assert!(words.contains("positions in the opposite order of the rows"), "{words}");
+    let mut data = clean.clone();
+    let rows = clean.measurements.len();
+    for (row, position) in data.measurements.positions.iter_mut().enumerate() {
+        *position = clean.measurements.positions[(row * 37 + 11) % rows];
+    }
+    let words = named(&problem, &data, FindingCode::ColumnDoubted);
+    assert!(words.contains("do not depend on the joint angles of their rows"), "{words}");
+    // A table of another arm depends on its joints.
+    let mut other = problem.clone();
+    for (joint, a) in other.joints.iter_mut().zip([0.1, 0.35, 0.2, 0.3, 0.15]) {
+        joint.a = a;
+    }
+    let found = fit_as_command(&problem, &measured(&other, 8));
+    let doubted = found.finding(FindingCode::ColumnDoubted).map(ToString::to_string);
+    let doubted = doubted.unwrap_or_default();
+    assert!(!found.is_trusted() && !doubted.contains("do not depend"), "{doubted}");
+}
+
+#[test]
+fn exchanged_lengths_of_neighbouring_joints_and_an_exchanged_target_are_named() {
+    let (mut problem, data) = arm();
+    let (third, fourth) = (problem.joints[2].a, problem.joints[3].a);
+    (problem.joints[2].a, problem.joints[3].a) = (fourth, third);
+    let words = named(&problem, &data, FindingCode::Misread);
+    assert!(words.contains("a of row 3 and a of row 4 of the joint table"), "{words}");
+    let (mut problem, data) = arm();
+    problem.tool.target.swap_rows(0, 2);
+    let found = fit_as_command(&problem, &data);
+    assert!(!found.is_trusted());
+    let said = found.findings.iter().any(|finding| {
+        let words = finding.to_string();
+        words.contains("x and z seem to be exchanged") || words.contains("target that lies")
+    });
+    assert!(said, "{:?}", found.findings);
+}
+
+#[test]
+fn inverse_poses_are_named() {
+    let (problem, mut data) = arm();
+    let rows = &mut data.measurements;
+    let turns: Vec<UnitQuaternion<f64>> = (0..rows.len())
+        .map(|row| {
+            let angle = 0.7 * (row as f64).sin();
+            UnitQuaternion::from_euler_angles(angle, 0.9 * (row as f64).cos(), 2.0 * angle)
+        })
+        .collect();
+    for (position, turn) in rows.positions.iter_mut().zip(&turns) {
+        *position = -(turn.inverse() * *position);
+    }
+    rows.orientations = Some(turns.iter().map(UnitQuaternion::inverse).collect());
+    let words = named(&problem, &data, FindingCode::Misread);
+    assert!(words.contains("poses that are inverse"), "{words}");
+}
