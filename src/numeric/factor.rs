@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
 use super::kernel::{add_product, factor_in_place};
+use super::product::{lower_product, product_with_lower};
 
 /// Largest number of rows for which a triangular solve or inverse proceeds column by column.
 const MAX_UNBLOCKED_ROWS: usize = 24;
@@ -77,13 +78,9 @@ pub(crate) fn inverse_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     let (half, other) = (n / 2, n - n / 2);
     let first = inverse_lower(&lower.view((0, 0), (half, half)).into_owned());
     let last = inverse_lower(&lower.view((half, half), (other, other)).into_owned());
+    let below = product_with_lower(&lower.view((half, 0), (other, half)).into_owned(), &first);
     let mut inverse = DMatrix::zeros(n, n);
-    inverse.view_mut((half, 0), (other, half)).gemm(
-        -1.0,
-        &last,
-        &(lower.view((half, 0), (other, half)) * &first),
-        0.0,
-    );
+    inverse.view_mut((half, 0), (other, half)).copy_from(&-lower_product(&last, &below));
     inverse.view_mut((0, 0), (half, half)).copy_from(&first);
     inverse.view_mut((half, half), (other, other)).copy_from(&last);
     inverse
