@@ -80,7 +80,7 @@ fn conclusion(cells: &[TimedCell]) -> String {
     let best = best.min_by(|a, b| rms(a).total_cmp(&rms(b)));
     let mut words = match best {
         Some(cell) => format!(
-            "Least error at held-out poses: {} mm rms ({})",
+            "Smallest error at held-out poses: {} mm rms ({})",
             number(rms(&cell), 4),
             name(&cell.0)
         ),
@@ -89,7 +89,7 @@ fn conclusion(cells: &[TimedCell]) -> String {
     let is_lost = |(cell, _): &&TimedCell| cell.failure_rate >= 1.0;
     let lost: Vec<String> = cells.iter().filter(is_lost).map(|cell| name(&cell.0)).collect();
     if !lost.is_empty() {
-        let _ = write!(words, ". No fit to be trusted in these cells: {}", lost.join("; "));
+        let _ = write!(words, ". In these cells no fit is to be trusted: {}", lost.join("; "));
     }
     words
 }
