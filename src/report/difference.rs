@@ -35,7 +35,8 @@ pub(crate) struct Side {
     pub estimate: SavedEstimate,
     /// Names of errors with their values in mm, ° or px, for example `held out, mean, mm`.
     pub errors: Vec<(String, f64)>,
-    /// The same errors without the remainder of the estimate; empty if it has none.
+    /// Names of errors with their values without the remainder of the estimate; empty if it has
+    /// none.
     pub without_remainder: Vec<(String, f64)>,
     /// Held-out rows that measure positions; empty if no file with them was found.
     pub held_out: Vec<HeldOutRow>,
@@ -68,7 +69,7 @@ impl HeldOutRow {
 struct Difference {
     /// Name and unit of the parameter.
     name: String,
-    /// Values of both estimates in that unit.
+    /// Values of both estimates, in the unit that `name` states.
     values: [f64; 2],
     /// Second value minus first one, and the standard error of this change; `None` unless both
     /// values have a standard error.

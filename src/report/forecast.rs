@@ -77,8 +77,7 @@ pub(super) fn separation_sentence(separated: &PairSeparation) -> Option<String> 
     let result = SeparationResult::new(separated);
     let [random, planned] = [result.random_angle_deg?, result.angle_deg?];
     Some(format!(
-        "The angle between the effects is {}° with these poses and {}° with random ones; at 90° they \
-         have nothing in common.",
+        "The angle between the two effects is {}° with these poses and {}° with random ones.",
         number(planned, 1),
         number(random, 1)
     ))

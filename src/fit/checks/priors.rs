@@ -126,8 +126,8 @@ const MIN_MEASURED_RMS: f64 = 1e-12;
 /// residual shows the noise.
 const MIN_NUMBERS_PER_PARAMETER: usize = 2;
 
-/// Checks that the declared σ of the leading kind of rows is not far above the rms residual of the
-/// fit.
+/// Checks that the declared σ of the leading kind of rows (positions, if there are any) is not far
+/// above the rms residual of the fit.
 pub(super) struct SigmaIsNotOverstated;
 
 impl Check for SigmaIsNotOverstated {

@@ -96,7 +96,7 @@ struct Cell {
     bound: f64,
     /// Number of configurations in the cell.
     count: usize,
-    /// Number of these that are far from all measured poses.
+    /// Number of configurations in the cell that are far from all measured poses.
     extrapolated: usize,
 }
 
