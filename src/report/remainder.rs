@@ -51,7 +51,7 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
         ),
         None => format!(
             "No remainder (smooth correction) is kept, because it {predicts}: mean error \
-             {without} mm without it, {with} mm with it, a gain of {} standard errors (more than {} are needed); the log \
+             {without} mm without it, {with} mm with it. The gain is {} standard errors (more than {} are needed); the log \
              predictive density changes by {} per row, {} standard errors (more than {} are needed), \
              the log likelihood by {} (more than {} is needed).",
             number(gain.error.ratio(), 2),

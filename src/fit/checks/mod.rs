@@ -187,8 +187,10 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     // Where the input is wrong, advice on poses, priors or σ would lead away from the mistake.
     let mistake = MISTAKES.iter().find(|code| findings.iter().any(|found| found.code == **code));
     if let Some(mistake) = mistake {
-        let remedy =
-            format!("correct first the mistake that the finding {} names", mistake.entry().code);
+        let remedy = format!(
+            "correct first the mistake that another finding ({}) names",
+            mistake.entry().code
+        );
         let is_consequence = |found: &&mut Finding| {
             CONSEQUENCES.contains(&found.code)
                 && (cause_text.is_none() || !OF_MISFIT.contains(&found.code))
