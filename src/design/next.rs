@@ -164,10 +164,13 @@ pub enum NextError {
 /// States why poses cannot decide among the effects of a loop.json.
 fn nothing_to_separate(follow_time: &[String]) -> String {
     if follow_time.is_empty() {
-        return "there is nothing to tell apart: loop.json has no effect that is uncertain or has an alternative".to_owned();
+        return "there is nothing to tell apart: loop.json has no effect that is uncertain or has \
+                an alternative"
+            .to_owned();
     }
     format!(
-        "poses cannot tell the uncertain effects of loop.json apart, because they follow the time of measurement ({})",
+        "poses cannot tell the uncertain effects of loop.json apart, because they follow the \
+         time of measurement ({})",
         follow_time.join("; ")
     )
 }

@@ -169,7 +169,8 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
         None => row.file.clone(),
     };
     let words = format!(
-        "{} {} excluded from the choice of effects, because gross errors lie as far off, or the model does not hold there: {}. \
+        "{} {} excluded from the choice of effects, because gross errors lie as far off, or the \
+         model does not hold there: {}. \
          {treatment}.",
         counted(rows.len(), "pose"),
         if rows.len() == 1 { "was" } else { "were" },

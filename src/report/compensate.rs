@@ -31,7 +31,8 @@ pub fn commands_text(
     if let (Some(before), Some(_)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
         let _ = write!(
             words,
-            "; without correction the identified arm would miss them by {} mm on average, measurement noise left out",
+            "; without correction the identified arm would miss them by {} mm on average, \
+             measurement noise left out",
             number(before, 4)
         );
     }

@@ -330,9 +330,8 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         return format!("The fit is to be trusted{reserved}.");
     }
     let raised = assumed_sigma_ratio(found);
-    let is_contradicted = accuracy.is_some_and(|accuracy| accuracy.contradicted.is_some());
-    let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some()) && !is_contradicted;
-    let scope = if (is_larger || raised.is_some()) && has_bound {
+    let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
+    let scope = if (is_larger || raised.is_some()) && has_bound && reservations.is_empty() {
         " within the error bound below"
     } else {
         ""

@@ -28,7 +28,8 @@ fn sufficiency<'a>(plan: &Plan) -> Block<'a> {
     let parameters = counted(plan.planned.expected.len(), "parameter");
     if rank >= attainable_rank {
         return Block::Text(format!(
-            "More such poses would determine no further combination of parameters: these determine {rank} of {}. That does not \
+            "More such poses would determine no further combination of parameters: these \
+             determine {rank} of {}. That does not \
              say that the errors are small enough: flexcal check says how many poses that takes.",
             plan.planned.expected.len()
         ));

@@ -51,7 +51,8 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
         ),
         None => format!(
             "No remainder (smooth correction) is kept, because it {predicts}: mean error \
-             {without} mm without it, {with} mm with it. The gain is {} standard errors (more than {} are needed); the log \
+             {without} mm without it, {with} mm with it. The gain is {} standard errors (more \
+             than {} are needed); the log \
              predictive density changes by {} per row, {} standard errors (more than {} are needed), \
              the log likelihood by {} (more than {} is needed).",
             number(gain.error.ratio(), 2),
@@ -265,8 +266,8 @@ fn are_predicted(bounds: &Bounds, errors: &[(usize, f64)]) -> bool {
         && largest <= MAX_COMPUTED_ERROR * bounds.expected()
 }
 
-/// States the expected error and its bound, both as root mean squares over the poses. With `compared`, adds the share of rows within
-/// their bounds and what the test says.
+/// States the expected error and its bound, both as root mean squares over the poses. With
+/// `compared`, adds the share of rows within their bounds and what the test says.
 pub(super) fn bound_sentence(bounds: &Bounds, compared: Option<Compared>) -> String {
     let compared = compared.filter(|compared| !compared.errors.is_empty());
     let test = compared.and_then(|compared| compared.test);

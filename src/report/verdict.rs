@@ -95,7 +95,8 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
                 String::new()
             } else if let Some(test) = failed {
                 format!(
-                    " With what is in the model, no structure is seen in the residual, but a residual test fails: {}.",
+                    " With what is in the model, no structure is seen in the residual, but a \
+                     residual test fails: {}.",
                     test.words
                 )
             } else {

@@ -60,7 +60,8 @@ impl Check for PriorsHold {
         let finding = |refuted: &RefutedPrior| {
             let RefutedPrior { rule, factor, sigma_ratio } = refuted;
             let text = format!(
-                "the data refute the σ of \"{rule}\" in [parameters]: a σ about {factor:.0} times as large would lower the \
+                "the data refute the σ of \"{rule}\" in [parameters]: a σ about {factor:.0} \
+                 times as large would lower the \
                  residual to {:.1} %",
                 100.0 * sigma_ratio
             );
