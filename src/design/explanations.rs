@@ -24,6 +24,8 @@ pub struct Explanations {
     /// Effects among which poses are to decide: those with an alternative or a lower status, and
     /// their alternatives.
     open: Vec<EffectDeclaration>,
+    /// Descriptions of effects that would be open, but follow the time of measurement.
+    pub(super) follow_time: Vec<String>,
     /// Digests of the rows that the loop fitted; empty in files of older versions.
     fitted_rows: Vec<String>,
 }
@@ -118,7 +120,9 @@ impl Explanations {
         };
         explanations.settled.retain(is_new);
         // The choice of poses cannot separate what follows the time of measurement.
-        explanations.open.retain(|of| is_new(of) && !of.effect.follows_time());
+        explanations.open.retain(is_new);
+        let follow_time = explanations.open.extract_if(.., |of| of.effect.follows_time());
+        explanations.follow_time = follow_time.map(|of| of.effect.describe()).collect();
         let mut names = Vec::new();
         explanations.open.retain(|of| {
             let name = of.effect.describe();

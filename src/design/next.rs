@@ -141,10 +141,11 @@ pub enum NextError {
     #[error(transparent)]
     Remainder(#[from] SavedRemainderError),
     /// The loop.json has no effects among which poses could decide.
-    #[error(
-        "there is nothing to tell apart: loop.json has no effect that is uncertain or has an alternative; use --for accuracy"
-    )]
-    NothingToSeparate,
+    #[error("{}; use --for accuracy", nothing_to_separate(follow_time))]
+    NothingToSeparate {
+        /// Uncertain effects that follow the time of measurement, which poses do not choose.
+        follow_time: Vec<String>,
+    },
     /// The request would take too long, or too much memory.
     #[error(
         "{poses} poses out of {candidates} candidates with {unknowns} unknowns are too many: ask for fewer poses at a time, or thin out \
@@ -158,6 +159,20 @@ pub enum NextError {
         /// Number of unknowns.
         unknowns: usize,
     },
+}
+
+/// States why poses cannot decide among the effects of a loop.json.
+fn nothing_to_separate(follow_time: &[String]) -> String {
+    if follow_time.is_empty() {
+        return "there is nothing to tell apart: loop.json has no effect that is uncertain or has \
+                an alternative"
+            .to_owned();
+    }
+    format!(
+        "poses cannot tell the uncertain effects of loop.json apart, because they follow the \
+         time of measurement ({})",
+        follow_time.join("; ")
+    )
 }
 
 impl NextError {
@@ -195,7 +210,8 @@ pub fn next(
     if options.purpose != Purpose::Accuracy
         && explanations.is_none_or(|of| of.open().next().is_none())
     {
-        return Err(NextError::NothingToSeparate);
+        let follow_time = explanations.map_or_else(Vec::new, |of| of.follow_time.clone());
+        return Err(NextError::NothingToSeparate { follow_time });
     }
     let mut plain = problem.clone();
     let has_declared_noise = data.measurements.has_declared_noise(problem);

@@ -55,8 +55,12 @@ pub enum ExportError {
     TwoGeometries,
     /// The problem declares no such camera.
     #[error(
-        "no such camera; {}",
-        if known.is_empty() { "the problem declares none".to_owned() } else { format!("there are {}", known.join(", ")) }
+        "{}",
+        if known.is_empty() {
+            "the problem declares no [[camera]], which this format needs".to_owned()
+        } else {
+            format!("no such camera; there are {}", known.join(", "))
+        }
     )]
     NoCamera {
         /// Names of the declared cameras.

@@ -108,7 +108,7 @@ impl ErrorSummary {
     }
 
     /// Summarises the `errors` measured − predicted of those `rows` that are of the leading kind of
-    /// `table`.
+    /// `table` (positions, if there are any).
     pub(crate) fn of_rows(
         table: &Measurements,
         rows: impl IntoIterator<Item = usize>,

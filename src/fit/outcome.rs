@@ -121,7 +121,8 @@ pub struct Identification {
     /// priors contradict the declared σ.
     pub noise_factor: f64,
     /// Standard deviation (1 σ) of a measured coordinate that the fit assumed \[m\] (of a tilt
-    /// \[rad\]): root mean square over the identification rows of the leading kind.
+    /// \[rad\]): root mean square over the identification rows of the leading kind (positions, if
+    /// there are any).
     pub sigma_taken: f64,
     /// Factor below 1 by which the fit multiplied declared σ that are too large; 1 if it did not
     /// reduce them.

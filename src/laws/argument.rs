@@ -46,15 +46,15 @@ pub enum ArgumentKind {
     Orders,
     /// Order of a wave \[cycles per revolution\].
     Order,
-    /// Time of an event, as in the table \[s\].
+    /// Time at which an effect begins or changes, on the clock of the table \[s\].
     Time,
     /// Duration, such as a time constant; above zero \[s\].
     Duration,
-    /// Length of a joint's path, above zero \[rad\].
+    /// Path of a joint over which an effect builds up; above zero \[rad\].
     Distance,
     /// Point in the plane normal to a joint's axis \[m\].
     Point,
-    /// Length, not negative \[m\].
+    /// Length at which a spring pulls with its preload alone, not negative \[m\].
     FreeLength,
 }
 

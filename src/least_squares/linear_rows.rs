@@ -7,9 +7,9 @@ use super::Block;
 /// Linear residual rows r = A x + b added to the data: priors and gauge conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearRows {
-    /// Matrix A, shape = (k, n).
+    /// Matrix A of r = A x + b, shape = (k, n).
     pub matrix: DMatrix<f64>,
-    /// Constant b, length k.
+    /// Constant b of r = A x + b, length k.
     pub constant: DVector<f64>,
 }
 
@@ -17,22 +17,22 @@ pub struct LinearRows {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RowsError {
-    /// The number of matrix columns differs from the number of unknowns.
+    /// The number of columns of the linear rows' matrix A differs from the number of unknowns.
     #[error(
         "adding linear rows: the matrix has {columns} columns, the problem {parameters} unknowns"
     )]
     Columns {
-        /// Number of columns of the matrix.
+        /// Number of columns of the matrix A of the linear rows.
         columns: usize,
-        /// Number of unknowns of the problem.
+        /// Number of unknowns of the least-squares problem.
         parameters: usize,
     },
-    /// Matrix and constant differ in their number of rows.
+    /// Matrix A and constant b of the linear rows differ in their number of rows.
     #[error("adding linear rows: the matrix has {matrix} rows, the constant {constant}")]
     Rows {
-        /// Number of rows of the matrix.
+        /// Number of rows of the matrix A of the linear rows.
         matrix: usize,
-        /// Number of entries of the constant.
+        /// Number of entries of the constant b of the linear rows.
         constant: usize,
     },
 }

@@ -35,9 +35,9 @@ pub struct WatchedCause {
     /// Changes of the parameters that the cause moves. For larger noise and for something else,
     /// this is the ratio of the errors to the assumed noise.
     pub changes: Vec<Change>,
-    /// Root mean square error of rows of the leading kind, each predicted with this cause as
-    /// estimated without the row \[m\] or \[rad\]. For a gross row it is the error of the other
-    /// rows; `None` for noise and for something else.
+    /// Root mean square error of rows of the leading kind (positions, if there are any), each
+    /// predicted with this cause as estimated without the row \[m\] or \[rad\]. For a gross row it
+    /// is the error of the other rows; `None` for noise and for something else.
     pub left_out_error: Option<f64>,
     /// Number of additional poses like the measured ones after which the data are expected to
     /// decide between this cause and the most probable other one; `None` if no number would
@@ -64,7 +64,7 @@ pub(super) struct Reporter<'a> {
     pub rows: &'a SensitiveRows,
     pub factor: &'a DMatrix<f64>,
     pub causes: &'a [Cause],
-    /// True for rows of the leading kind, whose errors are reported.
+    /// True for rows of the leading kind (positions, if there are any), whose errors are reported.
     pub leads: &'a [bool],
 }
 
@@ -103,13 +103,14 @@ impl Reporter<'_> {
         }
     }
 
-    /// Returns the root mean square length, over the rows of the leading kind, of the residuals
-    /// that `residual` returns in units of σ \[m\] or \[rad\].
+    /// Returns the root mean square length, over the rows of the leading kind (positions, if there
+    /// are any), of the residuals that `residual` returns in units of σ \[m\] or \[rad\].
     pub fn rms(&self, residual: impl Fn(usize) -> DVector<f64>) -> f64 {
         self.rms_of(|_| true, residual)
     }
 
-    /// Returns the same length over those rows for which `is_included` is true.
+    /// Returns the root mean square length of the residuals that `residual` returns over those rows
+    /// of the leading kind for which `is_included` is true \[m\] or \[rad\].
     fn rms_of(
         &self,
         is_included: impl Fn(usize) -> bool,
@@ -124,8 +125,9 @@ impl Reporter<'_> {
         (chosen.iter().map(square).sum::<f64>() / chosen.len().max(1) as f64).sqrt()
     }
 
-    /// Returns the root mean square error of the rows of the leading kind, each predicted with the
-    /// changes of the cause as estimated without the row's group. `None` if a number is not finite.
+    /// Returns the root mean square error of the rows of the leading kind (positions, if there are
+    /// any), each predicted with the changes of the cause as estimated without the row's group.
+    /// `None` if a number is not finite.
     fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
         let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
         let (rows, factor) = (&rows, padded_factor(self.factor, columns.len()));

@@ -65,7 +65,8 @@ pub struct Model {
     payload_follows: bool,
     /// Index of the joint whose frame carries each target.
     target_joints: Vec<usize>,
-    /// Orientation of each target in that frame, as a rotation vector \[rad\].
+    /// Orientation of each target in the frame of the joint that carries it (`target_joints`), as a
+    /// rotation vector \[rad\].
     target_rotations: Vec<Vector3<f64>>,
     /// Declared values of the fixtures (points, anchors, surfaces, cameras, markers); undeclared
     /// numbers are 0.

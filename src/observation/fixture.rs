@@ -109,7 +109,8 @@ impl<S: Scalar> Default for FixtureValues<S> {
 }
 
 impl FixtureValues<f64> {
-    /// Creates the values of a fixture; undeclared numbers are 0.
+    /// Creates the values of a fixture (point, surface, camera or marker of the set-up) from its
+    /// declared numbers; missing ones are 0.
     pub fn new(kind: FixtureKind, declared: &[Option<f64>]) -> Self {
         let mut values = Self { kind, ..Self::default() };
         for (number, declared) in values.numbers.iter_mut().zip(declared) {

@@ -64,8 +64,8 @@ pub struct Carried {
     pub widening: f64,
     /// Number of new rows that measure positions and are no outliers.
     pub positions: usize,
-    /// Number of these rows that condition the corrections: all, some if they are very many, or
-    /// none if one of them has no finite prediction.
+    /// Number of new rows that condition the corrections: all that measure positions and are no
+    /// outliers, some of them if they are very many, or none if one has no finite prediction.
     pub conditioning: usize,
 }
 

@@ -49,7 +49,7 @@ pub(super) struct MarginalLikelihood<'a> {
     /// For each amplitude, the kind of function and the sites that it scales. All constants share
     /// one amplitude.
     amplitudes: Vec<(Function, Vec<usize>)>,
-    /// Indices of the sites that have a function uⱼ of their own command.
+    /// Indices of the sites (joints) whose error has a function uⱼ of their own command.
     singles: Vec<usize>,
     /// True if noise that rows of one configuration share is estimated.
     shares_noise: bool,
@@ -120,25 +120,29 @@ impl<'a> MarginalLikelihood<'a> {
         })
     }
 
-    /// Returns the number of hyperparameters: the amplitudes, the lengths ℓᵤ and ℓᵥ, σ and, if rows
-    /// of a configuration share noise, σ_c.
+    /// Returns the number of hyperparameters: the amplitudes, the correlation lengths ℓᵤ of
+    /// functions of one command and ℓᵥ of functions of all inputs, the noise σ of a coordinate and,
+    /// if rows of a configuration share noise, its σ_c.
     pub fn len(&self) -> usize {
         self.input_lengths().end + 1 + usize::from(self.shares_noise)
     }
 
-    /// Returns the indices of the lengths ℓᵤ among the hyperparameters.
+    /// Returns the indices among the hyperparameters of the correlation lengths ℓᵤ of functions of
+    /// one command.
     fn single_lengths(&self) -> Range<usize> {
         self.amplitudes.len()..self.amplitudes.len() + self.singles.len()
     }
 
-    /// Returns the indices of the lengths ℓᵥ among the hyperparameters.
+    /// Returns the indices among the hyperparameters of the correlation lengths ℓᵥ of functions of
+    /// all inputs, one for each input.
     fn input_lengths(&self) -> Range<usize> {
         let first = self.single_lengths().end;
         first..first + self.inputs.angles.len()
     }
 
-    /// Returns families of hyperparameter indices whose lengths are expected to be similar. All ℓᵤ
-    /// form one family, all ℓᵥ of commands another, and each ℓᵥ of a condition a separate one.
+    /// Returns families of hyperparameter indices whose lengths are expected to be similar. The
+    /// lengths ℓᵤ of functions of one command form one family. Of the lengths ℓᵥ of functions of
+    /// all inputs, those of commands form another, and each of a condition a separate one.
     fn length_families(&self) -> Vec<Range<usize>> {
         let Range { start, end } = self.input_lengths();
         let is_command = |source: &&InputSource| matches!(source, InputSource::Command(_));
@@ -147,7 +151,8 @@ impl<'a> MarginalLikelihood<'a> {
         commands.chain((conditions..end).map(|k| k..k + 1)).collect()
     }
 
-    /// Returns the logarithms of initial hyperparameters; `lengths` are the initial ℓᵤ and ℓᵥ.
+    /// Returns the logarithms of initial hyperparameters; `lengths` are the initial correlation
+    /// lengths, ℓᵤ and ℓᵥ.
     pub fn start(&self, lengths: [f64; 2]) -> DVector<f64> {
         let amplitude = self.size - 0.5 * (self.amplitudes.len() as f64).ln();
         DVector::from_fn(self.len(), |k, _| match k {

@@ -21,7 +21,8 @@ pub(super) struct ParameterPrior {
 /// remainder is fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct InformationRows {
-    /// Scaled Jacobian J S½ of these rows.
+    /// Jacobian J of the rows that inform about the parameters alone, times the root S½ of the
+    /// prior covariance.
     scaled: DMatrix<f64>,
     /// Residuals at the mean of the prior, r − J m.
     target: DVector<f64>,

@@ -23,7 +23,7 @@ pub struct CorrectedResiduals {
     /// Correction and uncertainty of the prediction of each row.
     pub poses: Vec<CorrectedPose>,
     /// Errors of identification and held-out rows; in tables with several kinds of rows, those of
-    /// the leading kind.
+    /// the leading kind (positions, if there are any).
     pub errors: Errors,
 }
 

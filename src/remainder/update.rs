@@ -62,8 +62,8 @@ pub(crate) struct ChangedSince {
 pub(crate) struct EarlierCorrections {
     /// Uncertainty of predictions without a remainder.
     pub alone: Correction,
-    /// Remainder that corrects the predictions; `None` if the estimate has none, or the problem
-    /// declares another use.
+    /// Remainder that corrects the predictions; `None` if the estimate has none, or the section
+    /// `[remainder]` of the problem overrides it.
     pub remainder: Option<Correction>,
 }
 

@@ -18,7 +18,8 @@ const SCOPE_NOTE: &str = "These are errors of predicted positions. The accuracy 
 /// Returns a summary of the accuracy as text, ending in a line break.
 pub fn acceptance_text(problem: &Problem, result: &AcceptanceResult) -> String {
     let poses = counted(result.poses, "held-out pose");
-    let mut blocks = vec![Block::lines(format!("{}\n{poses}; {}", problem.title, result.protocol))];
+    let chosen = result.protocol.trim_start_matches("held out: ");
+    let mut blocks = vec![Block::lines(format!("{}\n{poses}: {chosen}", problem.title))];
     blocks.extend(result.tolerance.as_ref().map(|test| Block::Text(tolerance_text(test))));
     blocks.extend(accuracy_blocks(result));
     text(&blocks)

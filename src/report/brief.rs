@@ -80,7 +80,7 @@ fn remarks(found: &Identification) -> Vec<String> {
     if let Some(orientation) = &found.orientation {
         let mean = |of: &crate::fit::Errors| number(of.held_out.mean.norm.to_degrees(), 4);
         points.push(format!(
-            "orientation: {} ° before, {} ° after, mean of the held-out poses",
+            "orientation: {} ° before, {} ° after, mean error of the held-out poses",
             mean(&orientation.registered),
             mean(&orientation.fitted)
         ));
@@ -88,17 +88,20 @@ fn remarks(found: &Identification) -> Vec<String> {
     let farthest = found.outliers.iter().max_by(|a, b| a.distance.total_cmp(&b.distance));
     points.extend(farthest.map(|outlier| {
         let n = counted(found.outliers.len(), row_noun(found));
-        let stand = if found.outliers.len() == 1 { "stands" } else { "stand" };
+        let (stand, farthest) = match found.outliers.len() {
+            1 => ("stands", ""),
+            _ => ("stand", ", the farthest"),
+        };
         if includes_orientation(found, outlier.kind) {
             return format!(
-                "{n} {stand} out from the others by position and orientation together, the \
-                 farthest at {}: {} × the typical scatter",
+                "{n} {stand} out by position and orientation together{farthest}: {}, {} × the \
+                 typical scatter",
                 outlier.location,
                 number(outlier.distance, 1)
             );
         }
         format!(
-            "{n} {stand} out from the others, the farthest at {}: {}",
+            "{n} {stand} out{farthest}: {}, {}",
             outlier.location,
             size_of_kind(outlier.kind, outlier.error.norm(), 3)
         )

@@ -12,7 +12,7 @@ use super::identify::{
     fit_warnings, identifiability_with_figures, mean_error, parameters_fact, rms_and_largest,
     row_counts_fact, why_not_trusted,
 };
-use super::noise::{expected_interval, format_chi2, influential_rows, residual_fact};
+use super::noise::{expected_interval, format_chi2, influential_rows, reservations, residual_fact};
 use super::parameters::{against_priors, parameters};
 use super::remainder::{PredictionAccuracy, why_no_bound};
 use super::render::{Report, report, text};
@@ -49,7 +49,7 @@ pub fn loop_brief(
     accuracy: Option<PredictionAccuracy>,
 ) -> String {
     let result = &LoopResult::new(problem, closure);
-    let mut blocks = head(problem, closure, result);
+    let mut blocks = head(problem, closure, result, accuracy.as_ref());
     // The summary shows only the errors of held-out rows, whose column of χ² is empty.
     let corrected = accuracy.as_ref().and_then(|accuracy| accuracy.corrected);
     let mut table = errors(closure, result, corrected.as_ref());
@@ -86,7 +86,10 @@ pub fn loop_brief(
 /// Returns a found effect as a list item: at most `max_values` values ± 1 σ, probability of its
 /// law, and effects that the data do not exclude instead.
 fn cause(found: &FoundEffect, max_values: usize) -> Point {
-    let values = effect::values(&found.effect.effect, &found.parameters);
+    let mut values = effect::values(&found.effect.effect, &found.parameters);
+    if max_values < values.len() {
+        effect::sort_by_significance(&mut values, &found.parameters);
+    }
     // If the law only represents an unknown one, its values have no meaning.
     let stand_in = stand_in_sentence(found);
     let values = values.iter().filter(|_| stand_in.is_none()).map(|value| without_effect(value));
@@ -123,10 +126,16 @@ fn without_effect(value: &str) -> String {
 
 /// Returns the beginning of the summary and of the full text: title, counts of rows, verdict, and
 /// cautions that concern the causes.
-fn head<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
+fn head<'a>(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    result: &LoopResult,
+    accuracy: Option<&PredictionAccuracy>,
+) -> Vec<Block<'a>> {
+    let reservations = reservations(&closure.after, accuracy);
     let mut blocks = vec![
         Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
-        Block::Text(verdict(result, closure.after.sigma_scale < 1.0)),
+        Block::Text(verdict(result, closure.after.sigma_scale < 1.0, &reservations)),
     ];
     blocks.extend(cautions_on_causes(problem, closure, result));
     blocks
@@ -160,7 +169,8 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
         None => row.file.clone(),
     };
     let words = format!(
-        "{} {} excluded from the choice of effects, as far from the others as gross errors are, or where the model fails: {}. \
+        "{} {} excluded from the choice of effects, because gross errors lie as far off, or the \
+         model does not hold there: {}. \
          {treatment}.",
         counted(rows.len(), "pose"),
         if rows.len() == 1 { "was" } else { "were" },
@@ -172,7 +182,7 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
 /// Returns the full outcome as text, ending in a line break.
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let result = &LoopResult::new(problem, closure);
-    let mut blocks = head(problem, closure, result);
+    let mut blocks = head(problem, closure, result, None);
     blocks
         .extend([Block::Table(errors(closure, result, None)), gain_block(closure, result, false)]);
     let failed = residual_tests::failed(&closure.before.residual_tests);
@@ -233,7 +243,11 @@ fn blocks<'a>(
     let accuracy = PredictionAccuracy::new(after, plots);
     let mut blocks = vec![
         Block::Headline(headline(problem, closure, result, accuracy.as_ref())),
-        Block::Text(verdict(result, after.sigma_scale < 1.0)),
+        Block::Text(verdict(
+            result,
+            after.sigma_scale < 1.0,
+            &reservations(after, accuracy.as_ref()),
+        )),
         Block::Text(counts),
     ];
     blocks.extend(cautions_on_causes(problem, closure, result));

@@ -111,7 +111,7 @@ fn grouped_strategies(comparison: &Comparison, is_timed: bool) -> Table {
             strategies.iter().map(|(name, solvers)| format!("{name} ({})", solvers.join(", ")));
         let unit = fit.errors.judged().norms().1;
         table.notes.push(format!(
-            "the same to 0.0001 {unit} as {}, {}: {}",
+            "equal to {}, {} within 0.0001 {unit}: {}",
             fit.strategy,
             fit.solver,
             words.collect::<Vec<_>>().join("; ")

@@ -31,7 +31,8 @@ pub fn commands_text(
     if let (Some(before), Some(_)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
         let _ = write!(
             words,
-            "; without correction the identified arm would miss them by {} mm on average",
+            "; without correction the identified arm would miss them by {} mm on average, \
+             measurement noise left out",
             number(before, 4)
         );
     }
@@ -44,7 +45,9 @@ pub fn commands_text(
         );
     }
     if let Some(bounds) = bounds.filter(|_| result.reached > 0) {
-        let _ = write!(words, ".\n{}", bound_sentence(bounds, None));
+        let sentence = bound_sentence(bounds, None);
+        let size = sentence.trim_start_matches("Expected error");
+        let _ = write!(words, ".\nExpected error of the corrected commands{size}");
     } else if result.reached > 0 {
         words += ".\nThe expected error of the commands is not known, because the estimate states no uncertainty of positions.";
     }

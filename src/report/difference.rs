@@ -35,7 +35,8 @@ pub(crate) struct Side {
     pub estimate: SavedEstimate,
     /// Names of errors with their values in mm, ° or px, for example `held out, mean, mm`.
     pub errors: Vec<(String, f64)>,
-    /// The same errors without the remainder of the estimate; empty if it has none.
+    /// Names of errors with their values without the remainder of the estimate; empty if it has
+    /// none.
     pub without_remainder: Vec<(String, f64)>,
     /// Held-out rows that measure positions; empty if no file with them was found.
     pub held_out: Vec<HeldOutRow>,
@@ -68,7 +69,7 @@ impl HeldOutRow {
 struct Difference {
     /// Name and unit of the parameter.
     name: String,
-    /// Values of both estimates in that unit.
+    /// Values of both estimates, in the unit that `name` states.
     values: [f64; 2],
     /// Second value minus first one, and the standard error of this change; `None` unless both
     /// values have a standard error.
@@ -91,8 +92,11 @@ pub(crate) fn difference(sides: &[Side; 2]) -> Story {
     let [a, b] = sides.each_ref().map(|side| &side.estimate);
     let files = [("A", a), ("B", b)].map(|(name, side)| format!("{name}: {}", side.file.display()));
     let mut blocks = vec![Block::Lines("Estimates side by side".to_owned(), files.to_vec())];
-    blocks.push(Block::Text(verdict(&differences, tested, limit)));
-    blocks.extend(notes([a, b]).into_iter().map(Block::Note));
+    blocks.extend(declaration_note(a, b).map(Block::Note));
+    let shared = a.posterior.fitted_rows.intersection(&b.posterior.fitted_rows).count();
+    blocks.push(Block::Text(verdict(&differences, tested, limit, shared)));
+    blocks.extend(held_out_sentence(sides).map(Block::Text));
+    blocks.extend(notes([a, b], shared).into_iter().map(Block::Note));
     let error = |side: &Side, name: &str| {
         let found = side.errors.iter().find(|error| error.0 == name);
         or_dash(found, |error| number(error.1, 4))
@@ -103,7 +107,6 @@ pub(crate) fn difference(sides: &[Side; 2]) -> Story {
         .map(|(name, _)| vec![name.clone(), error(&sides[0], name), error(&sides[1], name)]);
     blocks.push(Block::Table(Table::new(&["error", "A", "B"], rows.collect(), &[0])));
     blocks.extend(remainder_sentences(sides).into_iter().map(Block::Text));
-    blocks.extend(held_out_sentence(sides).map(Block::Text));
     blocks.push(Block::figures([draw(&differences, limit)]));
     let listed = &differences[..differences.len().min(MAX_LISTED)];
     blocks.push(Block::Words(vec![Block::Table(table(listed))]));
@@ -182,8 +185,9 @@ fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
 }
 
 /// States whether the estimates differ by more than their standard errors allow. `tested` is the
-/// number of parameters with standard errors, `limit` the largest change \[standard errors\].
-fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
+/// number of parameters with standard errors, `limit` the largest change \[standard errors\], and
+/// `shared` the number of rows to which both were fitted.
+fn verdict(differences: &[Difference], tested: usize, limit: f64, shared: usize) -> String {
     let beyond = differences
         .iter()
         .filter(|of| of.sigmas().is_some_and(|sigmas| sigmas.abs() > limit))
@@ -204,6 +208,11 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
         number(100.0 * FALSE_ALARM_PROBABILITY, 0)
     );
     match beyond {
+        0 if shared > 0 => format!(
+            "No parameter differs by more than the errors shown allow ({most}; {test}). That does \
+             not show that they agree: both fits use {}, so these errors are too large.",
+            counted(shared, "common row")
+        ),
         0 => format!(
             "They agree: no parameter differs by more than its error allows ({most}; {test})."
         ),
@@ -259,19 +268,21 @@ fn held_out_sentence(sides: &[Side; 2]) -> Option<String> {
     ))
 }
 
-/// Lists what limits the comparison: different declarations, common rows, fits that are not
-/// trusted.
-fn notes([a, b]: [&SavedEstimate; 2]) -> Vec<String> {
+/// States that the two results are of arms with different declarations; `None` if they are not.
+fn declaration_note(a: &SavedEstimate, b: &SavedEstimate) -> Option<String> {
+    let part = a.differing_part(b)?;
+    let name = part.name;
+    let differs = match part.is_declared {
+        [true, false] => format!("Only A declares {name}"),
+        [false, true] => format!("Only B declares {name}"),
+        _ => format!("The arms are declared differently: {name}"),
+    };
+    Some(format!("{differs}. The parameters may differ for that reason alone."))
+}
+
+/// Lists what limits the comparison: `shared` common rows, and fits that are not trusted.
+fn notes([a, b]: [&SavedEstimate; 2], shared: usize) -> Vec<String> {
     let mut notes = Vec::new();
-    if let Some(part) = a.differing_part(b) {
-        let name = part.name;
-        notes.push(match part.is_declared {
-            [true, false] => format!("Only A declares {name}."),
-            [false, true] => format!("Only B declares {name}."),
-            _ => format!("The arms are declared differently: {name}."),
-        });
-    }
-    let shared = a.posterior.fitted_rows.intersection(&b.posterior.fitted_rows).count();
     if shared > 0 {
         notes.push(format!(
             "Both fits use {}: the true standard errors of the differences are smaller than shown.",

@@ -44,6 +44,18 @@ pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<Stri
     largest.chain((smaller > 0).then(|| format!("{smaller} smaller ones in loop.json"))).collect()
 }
 
+/// Sorts the texts of [`values`] so that the values largest in standard errors come first. Texts
+/// that are not one for each parameter keep their order.
+pub(super) fn sort_by_significance(texts: &mut Vec<String>, parameters: &[ParameterValue]) {
+    if texts.len() != parameters.len() {
+        return;
+    }
+    let sigmas = |of: &ParameterValue| of.std_error.map_or(0.0, |error| of.estimate.abs() / error);
+    let mut ranked: Vec<_> = std::mem::take(texts).into_iter().zip(parameters).collect();
+    ranked.sort_by(|a, b| sigmas(b.1).total_cmp(&sigmas(a.1)));
+    *texts = ranked.into_iter().map(|(text, _)| text).collect();
+}
+
 /// Formats a value ± its standard error in a convenient unit: `4.12 ± 0.05 µrad/(m·K)`. A small
 /// value whose error has less than two digits within [`MAX_DECIMALS`] is written with a power of
 /// ten: `(9.82 ± 0.31)·10⁻⁶ °`.

@@ -80,7 +80,8 @@ pub(super) fn test_rows_word(errors: &Errors) -> &'static str {
     if errors.is_left_out { "left out" } else { "held out" }
 }
 
-/// States the number of held-out (or left-out) rows of the leading kind: "50 held-out poses".
+/// States the number of held-out (or left-out) rows of the leading kind (positions, if there are
+/// any): "50 held-out poses".
 pub(super) fn held_out_rows(found: &Identification) -> String {
     let adjective = if found.fitted.is_left_out { "left-out " } else { "held-out " };
     counted_rows(found, &found.fitted.held_out, adjective)

@@ -182,13 +182,20 @@ fn comparison_blocks<'a>(
     geometries.sort_by(|(_, a), (_, b)| mean(a).total_cmp(&mean(b)));
     let least = geometries.first().map_or(0.0, |(_, summary)| mean(summary));
     let is_worse = mean(rigid) > MAX_EQUAL_RATIO * least;
-    let mut verdict = format!(
-        "The exported geometry alone misses {} {judged} {rows} by {} on average, the whole model by \
-         {}.",
-        whole.n,
-        size(rigid),
-        size(whole)
-    );
+    let [alone_size, whole_size] = [rigid, whole].map(size);
+    let mut verdict = if alone_size == whole_size {
+        format!(
+            "The exported geometry alone misses {} {judged} {rows} by {alone_size} on average, as \
+             the whole model does.",
+            whole.n
+        )
+    } else {
+        format!(
+            "The exported geometry alone misses {} {judged} {rows} by {alone_size} on average, the \
+             whole model by {whole_size}.",
+            whole.n
+        )
+    };
     let better_summary = match better {
         Some(option) if option == GEOMETRY_OPTIONS[0] => best_rigid.as_ref(),
         Some(_) => fitted_alone.as_ref(),

@@ -72,6 +72,17 @@ pub(super) fn format_size(value: Option<f64>, unit: &Display) -> String {
     or_dash(value, |value| two_digits(value * unit.factor, MAX_DECIMALS))
 }
 
+/// States how the plan changes the angle between the two effects; `None` if an angle is not known.
+pub(super) fn separation_sentence(separated: &PairSeparation) -> Option<String> {
+    let result = SeparationResult::new(separated);
+    let [random, planned] = [result.random_angle_deg?, result.angle_deg?];
+    Some(format!(
+        "The angle between the two effects is {}° with these poses and {}° with random ones.",
+        number(planned, 1),
+        number(random, 1)
+    ))
+}
+
 /// Returns the table of the angle, detectable sizes and p-values of the two effects, for planned
 /// and for random poses.
 pub(super) fn separation_blocks<'a>(separated: &PairSeparation) -> Vec<Block<'a>> {

@@ -34,8 +34,9 @@ pub fn init_text(
              image_px             width and height of its images\n  \
              pixel_sigma          1 σ of a found corner\n  \
              on                   the frame that carries the camera and the board; now {tip} and the world\n\
-             and put measurements.csv beside it (its columns stand there, too): a row for each corner of each image. Where camera and\n\
-             board are need not be known; the views decide it.\n\
+             and put measurements.csv beside it, with a row for each corner of each image; \
+             problem.toml lists the columns it needs.\n\
+             Where camera and board are need not be known; the views decide it.\n\
              Next: flexcal identify {word}, then flexcal loop {word}\n"
         );
         return words;
@@ -45,9 +46,11 @@ pub fn init_text(
         "\nWritten to {written}. Fill in there\n  \
          target_m           where the measured point sits in the frame of {tip}, roughly; now its origin\n  \
          position_sigma_mm  1 σ of a coordinate that your instrument measures; now {SIGMA_MM}\n  \
-         held_out           now {} % of the poses are held out to judge the fit; plan counts only those that are fitted,\n  \
-                            check says how many to measure\n\
-         and put measurements.csv beside it (its columns stand there, too). A URDF declares no elastic links. To look for elastic\n\
+         held_out           now {} % of the poses are held out to judge the fit\n\
+         and put measurements.csv beside it; problem.toml lists the columns it needs. flexcal \
+         check says how many poses to measure,\n\
+         those held out included; flexcal plan counts fitted poses alone. A URDF declares no \
+         elastic links. To look for elastic\n\
          effects of a link, declare it in [joint.beam]. To look for effects of temperature, give reference_temperature_C and a column\n\
          temperature_C.\n\
          Next: flexcal check {word} --poses 40, then flexcal loop {word}\n",

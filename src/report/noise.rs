@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::document::{Block, first_of, joined};
 use super::errors::{brief, row_noun, test_rows_word, unit, with_unit};
-use super::remainder::PredictionAccuracy;
+use super::prior::contradiction;
+use super::remainder::{HELD_OUT, PredictionAccuracy};
 use crate::fit::{FindingCode, Identification, Noise, Outlier, TypicalScatter, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, mm, number};
@@ -92,10 +93,9 @@ fn raised_sigma(found: &Identification) -> Option<String> {
     ))
 }
 
-/// Returns the ratio of the σ that the fit assumes to the declared one, if the fit raised σ because
-/// the new rows contradict its prior.
-pub(super) fn raised_sigma_ratio(found: &Identification) -> Option<f64> {
-    let prior = found.prior.as_ref().filter(|prior| prior.has_raised_sigma)?;
+/// Returns the ratio of the σ that a fit with a prior assumes to the declared one, if it is larger.
+fn assumed_sigma_ratio(found: &Identification) -> Option<f64> {
+    let prior = found.prior.as_ref().filter(|prior| prior.estimated_sigma.is_none())?;
     (prior.variance_ratio > MAX_EQUAL_VARIANCE_RATIO).then(|| prior.variance_ratio.sqrt())
 }
 
@@ -279,13 +279,36 @@ pub(super) fn residual_fact(term: &'static str, found: &Identification) -> (&'st
     (term, size)
 }
 
-/// Codes of warnings that contradict a trusted fit or its predictions, so that its headline names
-/// reservations.
-const RESERVATIONS: [FindingCode; 3] =
-    [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutNotBetter, FindingCode::RowsChanged];
+/// Returns what contradicts a trusted fit or its predictions, for its headline: held-out rows that
+/// the fit made worse, new rows against the prior, other held-out rows, and changes between rows.
+pub(super) fn reservations(
+    found: &Identification,
+    accuracy: Option<&PredictionAccuracy>,
+) -> Vec<String> {
+    let worse = found.has(FindingCode::HeldOutNotBetter).then(|| {
+        "the fit made held-out errors worse than those of the nominal arm, beyond chance".to_owned()
+    });
+    let prior = found.prior.as_ref().and_then(contradiction);
+    let test = accuracy.and_then(|accuracy| accuracy.contradicted);
+    let exceeding = test.map(|test| {
+        let (beyond, of) = (test.beyond(), test.of);
+        format!("{beyond} of {of} {HELD_OUT} exceed their error bound, beyond chance")
+    });
+    let farther = found.has(FindingCode::HeldOutBeyondPrediction).then(|| {
+        "held-out rows are farther from the prediction than the fit expects, beyond chance"
+            .to_owned()
+    });
+    // The text of this finding names the rows after the colon.
+    let outliers = found.finding(FindingCode::HeldOutOutliers);
+    let outliers = outliers.and_then(|finding| finding.text.split(": ").next().map(str::to_owned));
+    let changed = found
+        .has(FindingCode::RowsChanged)
+        .then(|| "something changed between the rows (see the warnings)".to_owned());
+    [worse, prior, exceeding.or(farther).or(outliers), changed].into_iter().flatten().collect()
+}
 
-/// States whether the fit is to be trusted, the held-out error before and after it, and how much
-/// its residual exceeds the declared noise.
+/// States whether the fit is to be trusted, with what contradicts it, the held-out error before and
+/// after it, and how much its residual exceeds the declared noise.
 pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccuracy>) -> String {
     if let Some(reason) = found.first_error() {
         return format!("Not to be trusted: {reason}.");
@@ -297,16 +320,22 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         ResidualSize::Contradicted(chi2) | ResidualSize::Unclear(chi2) => chi2 > 1.0,
         _ => false,
     };
+    let reservations = reservations(found, accuracy);
+    let reserved = if reservations.is_empty() {
+        String::new()
+    } else {
+        format!(", but {}", reservations.join("; "))
+    };
     if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
-        return "The fit is to be trusted.".to_owned();
+        return format!("The fit is to be trusted{reserved}.");
     }
+    let raised = assumed_sigma_ratio(found);
     let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
-    let is_raised = raised_sigma_ratio(found).is_some();
-    let scope =
-        if (is_larger || is_raised) && has_bound { " within the error bound below" } else { "" };
-    let is_reserved =
-        is_raised || found.cautions().any(|caution| RESERVATIONS.contains(&caution.code));
-    let reserved = if is_reserved { ", with reservations (see the warnings)" } else { "" };
+    let scope = if (is_larger || raised.is_some()) && has_bound && reservations.is_empty() {
+        " within the error bound below"
+    } else {
+        ""
+    };
     let size = if found.noise_factor > 1.0 {
         format!("{} × the declared σ", number(found.noise_factor.sqrt(), 1))
     } else {
@@ -324,18 +353,15 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     } else if after.mean.norm < before.mean.norm {
         format!("falls from {from} to {to}")
     } else {
-        format!("does not fall: it goes from {from} to {to}")
+        format!("rises from {from} to {to}")
     };
     format!(
         "Trusted{scope}{reserved}: the mean {} error {change}{without}.{}",
         test_rows_word(&found.fitted).replace(' ', "-"),
         if is_larger {
             format!(" Not fully explained: the residual{of} is {size}.")
-        } else if let Some(ratio) = raised_sigma_ratio(found) {
-            format!(
-                " Not fully explained: the new rows contradict the prior, so the fit assumes {} × the declared σ.",
-                number(ratio, 1)
-            )
+        } else if let Some(ratio) = raised {
+            format!(" Not fully explained: the fit assumes {} × the declared σ.", number(ratio, 1))
         } else {
             String::new()
         }

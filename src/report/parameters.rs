@@ -69,6 +69,12 @@ pub(super) fn parameters<'a>(
          parameter's prior, a bound or constraint, or the start value along unidentifiable combinations"
             .to_owned(),
     );
+    let is_vague = |estimate: &Estimate| {
+        Knowledge::of(estimate, &found.active_constraints) == Knowledge::Vaguely
+    };
+    notes.extend(found.estimates.iter().any(is_vague).then(|| {
+        "but vaguely: no standard error, or one above 1°, 10 mm or half of the stiffness".to_owned()
+    }));
     notes.extend(rows_of_sheet(problem));
     notes.extend(suggested_prior_sigmas(&found.prior_sizes).filter(|_| found.is_trusted()));
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];

@@ -4,7 +4,7 @@
 use super::candidates::{at_limits, candidates_drawn};
 use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Drawing, Forest};
-use super::forecast::{assumptions, cells, separation_blocks};
+use super::forecast::{assumptions, cells, separation_blocks, separation_sentence};
 use super::next::command_table;
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::Story;
@@ -28,7 +28,8 @@ fn sufficiency<'a>(plan: &Plan) -> Block<'a> {
     let parameters = counted(plan.planned.expected.len(), "parameter");
     if rank >= attainable_rank {
         return Block::Text(format!(
-            "The rank is complete: more such poses determine no further combination of parameters (rank {rank} of {}). That does not \
+            "More such poses would determine no further combination of parameters: these \
+             determine {rank} of {}. That does not \
              say that the errors are small enough: flexcal check says how many poses that takes.",
             plan.planned.expected.len()
         ));
@@ -84,6 +85,7 @@ pub fn plan(
         counted(plan.starts.len(), "start"),
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
+    blocks.extend(separated.and_then(separation_sentence).map(Block::Text));
     blocks.push(sufficiency(plan));
     blocks.extend(gain);
     blocks.extend(at_limits(problem, &plan.poses, "plan").map(Block::Text));

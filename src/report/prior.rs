@@ -96,6 +96,16 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
     text + &verdict
 }
 
+/// States that the new rows contradict the earlier estimate; `None` if they do not.
+pub(super) fn contradiction(comparison: &PriorComparison) -> Option<String> {
+    let words = "the new rows contradict the prior";
+    match comparison.chi2 {
+        Some((.., p)) if p < MIN_AGREEING_P => Some(format!("{words} (p {})", p_value(p))),
+        _ if comparison.has_raised_sigma || !comparison.causes.is_empty() => Some(words.to_owned()),
+        _ => None,
+    }
+}
+
 fn row(compared: &ComparedParameter) -> Vec<String> {
     let unit = compared.unit.display(compared.prior.0);
     let error = compared.posterior.1.unwrap_or(compared.prior.1);

@@ -51,7 +51,8 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
         ),
         None => format!(
             "No remainder (smooth correction) is kept, because it {predicts}: mean error \
-             {without} mm without it, {with} mm with it, a gain of {} standard errors (more than {} are needed); the log \
+             {without} mm without it, {with} mm with it. The gain is {} standard errors (more \
+             than {} are needed); the log \
              predictive density changes by {} per row, {} standard errors (more than {} are needed), \
              the log likelihood by {} (more than {} is needed).",
             number(gain.error.ratio(), 2),
@@ -146,7 +147,7 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
     }
     blocks.push(Block::figures([
         figures::joint_errors(plots),
-        figures::bounds_over_workspace(plots),
+        if found.is_trusted() { figures::bounds_over_workspace(plots) } else { None },
     ]));
     blocks
 }
@@ -178,8 +179,11 @@ pub(super) fn why_no_bound(found: &Identification) -> Option<String> {
 /// Accuracy of predictions that the summaries of `identify` and `loop` state.
 #[derive(Debug, Clone)]
 pub struct PredictionAccuracy {
-    /// Sentence on the mean error bound over the workspace; `None` if the bound is not known.
+    /// Sentence on the mean error bound over the workspace; `None` if the bound is not known or the
+    /// fit is not to be trusted.
     pub bound: Option<String>,
+    /// Test of the bounds at held-out configurations, if more exceed them than chance explains.
+    pub contradicted: Option<BoundTest>,
     /// Errors of held-out rows with the remainder; `None` if there is none, or no row is held out.
     pub corrected: Option<ErrorSummary>,
 }
@@ -202,13 +206,18 @@ impl PredictionAccuracy {
             format!(", of which {} % is far from all measured poses", number(far, 0))
         };
         let kept = contradicted_bound(uncertainty.test.as_ref(), HELD_OUT);
-        let bound = mean.is_finite().then(|| {
+        let contradicted = uncertainty.test.filter(BoundTest::is_contradicted);
+        let bound = (mean.is_finite() && found.is_trusted()).then(|| {
             format!(
                 "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the measured joint ranges{far}.{kept}",
                 two_digits(mean * 1e3, 4)
             )
         });
-        Some(Self { bound, corrected: held_out.filter(|_| !found.fitted.is_left_out) })
+        Some(Self {
+            bound,
+            contradicted,
+            corrected: held_out.filter(|_| !found.fitted.is_left_out),
+        })
     }
 }
 
@@ -257,16 +266,18 @@ fn are_predicted(bounds: &Bounds, errors: &[(usize, f64)]) -> bool {
         && largest <= MAX_COMPUTED_ERROR * bounds.expected()
 }
 
-/// States the expected error and its mean bound. With `compared`, adds the share of rows within
-/// their bounds and what the test says.
+/// States the expected error and its bound, both as root mean squares over the poses. With
+/// `compared`, adds the share of rows within their bounds and what the test says.
 pub(super) fn bound_sentence(bounds: &Bounds, compared: Option<Compared>) -> String {
     let compared = compared.filter(|compared| !compared.errors.is_empty());
     let test = compared.and_then(|compared| compared.test);
+    let squares = (0..bounds.poses.len()).map(|pose| bounds.bound(pose).powi(2));
+    let bound = (squares.sum::<f64>() / bounds.poses.len() as f64).sqrt();
     let mut words = format!(
-        "Expected error {} mm rms, measurement noise included; the {} % bound is {} mm on average",
+        "Expected error {} mm rms, measurement noise included; the {} % bound is {} mm rms",
         number(bounds.expected() * 1e3, 3),
         percent_of(bounds.level),
-        number(bounds.mean() * 1e3, 3),
+        number(bound * 1e3, 3),
     );
     if let Some(compared) = compared
         && are_predicted(bounds, compared.errors)

@@ -22,7 +22,8 @@ pub(super) fn other_reduced_chi2(
         .outcome
         .as_ref()
         .ok()?;
-    let words = "χ²/ν of these tests is not that of the fit: the tests leave out outliers, and fit each stiffness by itself.";
+    let words = "χ²/ν of the tests differs from that of the fit, because the tests leave out \
+                 outliers and fit each stiffness by itself.";
     (number(size.statistic, 2) != number(fit.reduced_chi2?, 2))
         .then(|| Block::Text(words.to_owned()))
 }

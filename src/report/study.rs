@@ -57,7 +57,10 @@ pub fn study(study: &Study, results: &Results) -> Story {
         ],
     );
     let table = table.noted(&[
-        "not trusted: share of fits that failed or are not to be trusted; held out: measured − predicted, noise included; covered: share of estimates within 1.96 standard errors of the truth, 95 % if the standard errors are right;",
+        "not trusted: share of fits that failed or are not to be trusted, of which errors, \
+         coverage and bias say nothing; held out: measured − predicted, noise included; covered: \
+         share of estimates within 1.96 standard errors of the truth, 95 % if the standard \
+         errors are right;",
         "largest bias: largest ratio of bias to standard deviation of the errors, over all parameters, those that stay nominal included; ms: median time of a fit",
     ]);
     let [titled, untitled] = opening(&study.title, head);
@@ -79,17 +82,25 @@ fn conclusion(cells: &[TimedCell]) -> String {
     let best = cells.iter().filter(|cell| cell.0.held_out_mm.rms.is_some());
     let best = best.min_by(|a, b| rms(a).total_cmp(&rms(b)));
     let mut words = match best {
-        Some(cell) => format!(
-            "Least error at held-out poses: {} mm rms ({})",
-            number(rms(&cell), 4),
-            name(&cell.0)
-        ),
+        Some(cell) => {
+            let distrusted = match cell.0.failure_rate {
+                rate if rate > 0.0 => {
+                    format!("; {} % of its fits are not to be trusted", number(100.0 * rate, 1))
+                }
+                _ => String::new(),
+            };
+            format!(
+                "Smallest error at held-out poses: {} mm rms ({}{distrusted})",
+                number(rms(&cell), 4),
+                name(&cell.0)
+            )
+        }
         None => "No fit succeeded".to_owned(),
     };
     let is_lost = |(cell, _): &&TimedCell| cell.failure_rate >= 1.0;
     let lost: Vec<String> = cells.iter().filter(is_lost).map(|cell| name(&cell.0)).collect();
     if !lost.is_empty() {
-        let _ = write!(words, ". No fit to be trusted in these cells: {}", lost.join("; "));
+        let _ = write!(words, ". In these cells no fit is to be trusted: {}", lost.join("; "));
     }
     words
 }

@@ -280,7 +280,8 @@ pub(super) fn ranking<'a>(
     );
     if significant.len() > max {
         let more = significant.len() - max;
-        let _ = write!(notes, " {more} more significant ones are left out here; {where_all}.");
+        let are = if more == 1 { "one is" } else { "ones are" };
+        let _ = write!(notes, " {more} more significant {are} left out here; {where_all}.");
     }
     if shown.iter().any(|candidate| !candidate.alike.is_empty()) {
         notes.push_str(

@@ -89,7 +89,7 @@ pub(super) fn structure_places(result: &LoopResult) -> Vec<String> {
             if let (Some(limit), Some(claims)) = (&left.limit, claims) {
                 let _ = write!(
                     words,
-                    "; the limit {limit} causes it with probability {}",
+                    "; the limit {limit} is involved, probability {}",
                     percent(claims.law.probability)
                 );
             }

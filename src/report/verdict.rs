@@ -19,8 +19,12 @@ pub fn interrupted(rounds: usize) -> String {
 }
 
 /// States the outcome of the loop in one to three sentences. `assumes_smaller_sigma` is true if the
-/// fit assumed a smaller σ than the declared one.
-pub(super) fn verdict(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
+/// fit assumed a smaller σ than the declared one; `reservations` contradict a trusted fit.
+pub(super) fn verdict(
+    result: &LoopResult,
+    assumes_smaller_sigma: bool,
+    reservations: &[String],
+) -> String {
     let rounds = result.steps.len();
     let end = if result.interrupted {
         format!("Search {}. ", interrupted(rounds))
@@ -36,7 +40,13 @@ pub(super) fn verdict(result: &LoopResult, assumes_smaller_sigma: bool) -> Strin
     } else {
         ""
     };
-    end + caution + &outcome(result, assumes_smaller_sigma)
+    let mut outcome = outcome(result, assumes_smaller_sigma);
+    let is_settled = result.verdict != Verdict::Unexplained || result.is_probably_explained();
+    if result.trusted && is_settled && !reservations.is_empty() {
+        outcome.truncate(outcome.trim_end_matches('.').len());
+        outcome += &format!(", but {}.", reservations.join("; "));
+    }
+    end + caution + &outcome
 }
 
 /// States how many effects were found, and how many other causes are uncertain: "2; 1 not sure".
@@ -77,14 +87,20 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
         }
         (_, false) => format!("{found}; structure in the residual could not be tested."),
         (Verdict::Unexplained, true) => {
+            let failed = result.checks_after.iter().find(|test| test.failed);
             let noise = if result.is_contradicted() {
                 " Held-out rows or rows that were set aside contradict the fit: see the warnings."
+                    .to_owned()
             } else if result.with_status(Status::Contradicted).next().is_some() {
-                ""
-            } else if result.checks_after.iter().any(|test| test.failed) {
-                " With what is in the model, no structure is seen in the residual, but a residual test fails."
+                String::new()
+            } else if let Some(test) = failed {
+                format!(
+                    " With what is in the model, no structure is seen in the residual, but a \
+                     residual test fails: {}.",
+                    test.words
+                )
             } else {
-                " With what is in the model, the residual looks like noise."
+                " With what is in the model, the residual looks like noise.".to_owned()
             };
             format!("Unexplained: {}.{noise}", with_lower_initial(&found))
         }

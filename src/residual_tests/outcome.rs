@@ -274,7 +274,7 @@ fn order_phrase(sequence: Sequence) -> &'static str {
 
 fn untested_phrase(test: &Test) -> String {
     match test {
-        Test::ReducedChiSquared => "size against σ".to_owned(),
+        Test::ReducedChiSquared => "size of the residual against σ".to_owned(),
         Test::LackOfFit => "size against repeated poses".to_owned(),
         Test::Runs { sequence } => format!("signs {}", order_phrase(*sequence)),
         Test::LjungBox { sequence } => format!("autocorrelation {}", order_phrase(*sequence)),

@@ -75,7 +75,7 @@ pub struct CoveredBound {
     pub bounds: BoundSummary,
     /// Share of the rows whose error is within its bound, 0 to 1.
     pub coverage: f64,
-    /// Number of these rows.
+    /// Number of held-out rows that have an error and a bound.
     pub rows: usize,
     /// Probability that chance alone leaves as few held-out configurations within their bounds.
     pub coverage_p_value: f64,

@@ -71,9 +71,9 @@ pub struct Curve {
 pub struct PartialResidual {
     /// Value of the covariate, in its unit.
     pub covariate: f64,
-    /// Value of the correction at this pose \[rad\] or \[m\].
+    /// Value at the pose of the correction that the fit found for the coordinate \[rad\] or \[m\].
     pub correction: f64,
-    /// Error of the coordinate according to this pose alone \[rad\] or \[m\].
+    /// Error of the coordinate that the pose alone indicates \[rad\] or \[m\].
     pub value: f64,
     /// Length |l| of the lever \[m/rad\] or \[m/m\]. Poses with a short lever determine the
     /// coordinate poorly.

@@ -14,9 +14,10 @@ pub struct MountedLink {
     /// Name of the link: that of the camera or marker with the suffix `_optical_frame` or
     /// `_marker`.
     pub link: String,
-    /// Frame that it moves with: 0 is the base, i the frame of joint i.
+    /// Index of the frame that the camera or marker moves with: 0 is the base, i the frame of joint
+    /// i.
     pub carrier: usize,
-    /// Pose of the camera or marker in that frame.
+    /// Pose of the camera or marker in the frame `carrier`.
     pub pose: Frame<f64>,
 }
 

@@ -316,7 +316,8 @@ fn the_service_arm_shows_which_limit_is_wrong() {
     // The bound comes from predictions in the workspace, of which the fit alone knows nothing.
     let lines = block.lines().skip_while(|line| !line.starts_with("Error bound of a prediction"));
     let bound: Vec<&str> = lines.take_while(|line| !line.is_empty()).collect();
-    let accuracy = PredictionAccuracy { bound: Some(bound.join("\n")), corrected: None };
+    let bound = Some(bound.join("\n"));
+    let accuracy = PredictionAccuracy { bound, contradicted: None, corrected: None };
     let printed = estimate_text(&problem, &found, Some(accuracy));
     for line in block.split("```").next().unwrap().lines() {
         assert!(printed.contains(line), "{line}");

@@ -66,7 +66,7 @@ pub struct ErrorsBySession {
     /// Errors of each kind of rows; empty if there is only one kind.
     pub kinds: Vec<ErrorSummary>,
     /// Name and errors of each session, in the order of the table; the errors are those of the
-    /// leading kind of the session's rows. Empty without sessions.
+    /// leading kind of the session's rows (positions, if there are any). Empty without sessions.
     pub sessions: Vec<(String, ErrorSummary)>,
 }
 

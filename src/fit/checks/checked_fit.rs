@@ -62,7 +62,8 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub noise: Noise,
     /// Noise variance that the fit assumed, relative to the declared one.
     pub noise_factor: f64,
-    /// 1 σ of a coordinate of the leading kind of rows that the fit assumed \[m\] or \[rad\].
+    /// 1 σ that the fit assumed for a coordinate of positions, or of the first kind of rows if none
+    /// measures a position \[m\] or \[rad\].
     pub sigma_taken: f64,
     /// Covariance of the unknowns of `whole`, shape = (unknowns, unknowns); 0 for held unknowns.
     pub covariance: &'a DMatrix<f64>,

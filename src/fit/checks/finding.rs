@@ -80,7 +80,7 @@ finding_codes! {
         "measure more poses of this session, or give its base a prior";
     Misread: Error "misread" ["explanations", "before", "after"]
         "With another reading of the table or the problem, less than a fifth of the error remains, or no more than noise.",
-        "correct units, signs, order or convention in the table or the problem";
+        "correct the table or the problem accordingly";
     ViewsReversed: Error "views-reversed" ["views", "before", "after"]
         "Some views number the points of a marker from the other end.",
         "reverse the column point in these views or leave them out; a board that looks different after half a turn prevents it";
@@ -168,11 +168,13 @@ finding_codes! {
         "The commands of each joint are multiples of a step, and rounding to these steps would leave an error of the size of the residual.",
         "log the joint angles with more digits";
     SigmaOverstated: Warning "sigma-overstated" ["sigma", "rms"]
-        "The declared σ of the leading kind of rows is more than 30 times what the fit leaves.",
+        "The declared σ of the leading kind of rows (positions, if there are any) is more than \
+         30 times what the fit leaves.",
         "check the unit of σ: micrometres under a key in millimetres make it 1000 times too large";
     EarlierEstimateContradicted: Warning "earlier-estimate-contradicted" ["cause", "probability", "widened"]
         "New rows contradict the earlier estimate that is the prior, with a false alarm in at most one of 100 fits.",
-        "look for what happened to the arm since, which flexcal watch tells; after a prior of a fleet, for what sets this arm apart";
+        "find what happened to the arm since (flexcal watch tells); if the prior is of a fleet, \
+         find how this arm differs from it";
     HeldOutRepeated: Warning "held-out-repeated" ["rows", "of"]
         "Some held-out rows are identification rows again.",
         "hold out rows that were not fitted";

@@ -63,7 +63,8 @@ impl Check for HeldGeometryIsRight {
 
 /// Result of a fit to the identification rows.
 struct Trial {
-    /// Root mean square of the errors of the leading kind of rows \[m\].
+    /// Root mean square of the errors of the leading kind of rows (positions, if there are any)
+    /// \[m\].
     rms: f64,
     /// Mean square of the errors of configurations that are left out one at a time \[m²\].
     left_out: f64,

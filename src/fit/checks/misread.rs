@@ -90,13 +90,14 @@ impl Check for ReadAsMeant {
             let instead = if rms < MAX_PLAIN_PART * explanations.as_read {
                 let plain = format_error(name, rms, 3);
                 format!(
-                    "{rest}, and as read it is {plain} only with parameters far beyond their priors"
+                    "{rest}; as read it is {plain}, but only with parameters far beyond their \
+                     priors"
                 )
             } else {
-                format!("{rest} instead of {as_read}")
+                format!("{rest}; as read it is {as_read} (the less of nominal and fitted arm)")
             };
             let text = format!(
-                "the measurements fit if they are read in another way: with {named}{more}, the \
+                "the measurements fit if they are read in another way: with {named}{more}, the rms \
                  error would be {instead}"
             );
             return vec![Finding::new(FindingCode::Misread, numbers, text)];
@@ -104,7 +105,9 @@ impl Check for ReadAsMeant {
         let is_clear = best.rms <= MAX_CLEAR_RATIO * explanations.as_read;
         if is_clear {
             let text = format!(
-                "the measurements fit better if they are read in another way: with {named}{more}, the error would be {rest} instead of {as_read}, which is more than the declared σ: the model lacks something, or another mistake remains"
+                "the measurements fit better if they are read in another way: with \
+                 {named}{more}, the rms error would be {rest} (as read {as_read}). That is still \
+                 more than the declared σ: the model lacks something, or another mistake remains"
             );
             return vec![Finding::new(FindingCode::Misread, numbers, text)];
         }

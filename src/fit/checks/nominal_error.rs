@@ -25,8 +25,8 @@ const MIN_RELATIVE_SPREAD: f64 = 0.05;
 /// measurements.
 pub(super) struct NominalIsNear;
 
-/// Returns true if the rms error of the registered nominal arm in rows of the leading kind exceeds
-/// [`MAX_NOMINAL_MISS`] times their spread.
+/// Returns true if the rms error of the registered nominal arm in rows of the leading kind
+/// (positions, if there are any) exceeds [`MAX_NOMINAL_MISS`] times their spread.
 pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
     let rms = fit.registered.identification.rms.norm;
     let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());

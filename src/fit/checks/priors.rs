@@ -60,8 +60,9 @@ impl Check for PriorsHold {
         let finding = |refuted: &RefutedPrior| {
             let RefutedPrior { rule, factor, sigma_ratio } = refuted;
             let text = format!(
-                "the data refute the σ of \"{rule}\" in [parameters]: with about {factor:.0} times that the fit would leave {:.1} % of \
-                 its residual",
+                "the data refute the σ of \"{rule}\" in [parameters]: a σ about {factor:.0} \
+                 times as large would lower the \
+                 residual to {:.1} %",
                 100.0 * sigma_ratio
             );
             let numbers = [json!(rule), (*factor).into(), (*sigma_ratio).into()];
@@ -126,8 +127,8 @@ const MIN_MEASURED_RMS: f64 = 1e-12;
 /// residual shows the noise.
 const MIN_NUMBERS_PER_PARAMETER: usize = 2;
 
-/// Checks that the declared σ of the leading kind of rows is not far above the rms residual of the
-/// fit.
+/// Checks that the declared σ of the leading kind of rows (positions, if there are any) is not far
+/// above the rms residual of the fit.
 pub(super) struct SigmaIsNotOverstated;
 
 impl Check for SigmaIsNotOverstated {

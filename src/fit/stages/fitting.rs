@@ -376,8 +376,8 @@ impl<'a> Fitting<'a> {
         Ok(end)
     }
 
-    /// Returns the errors of identification and held-out rows of the leading kind at the full
-    /// parameter vector `x`.
+    /// Returns the errors of identification and held-out rows of the leading kind (positions, if
+    /// there are any) at the full parameter vector `x`.
     pub fn errors(&self, x: &DVector<f64>) -> Errors {
         self.errors_of(self.measurements.leading(), x)
     }

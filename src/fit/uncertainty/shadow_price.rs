@@ -11,8 +11,9 @@ pub struct ShadowPrice {
     /// Lagrange multiplier: decrease of ½χ² per unit by which the limit is moved outwards, with the
     /// priors included in χ² \[1 / SI unit of the limit\]. Limits of logarithms have no unit.
     pub multiplier: f64,
-    /// Decrease of the rms residual of the rows of the leading kind per unit of the limit, if the
-    /// whole decrease of χ² came from these rows \[m / SI unit of the limit\].
+    /// Decrease of the rms residual of positions (of the first kind of rows, if none measures a
+    /// position) per unit of the limit, if the whole decrease of χ² came from these rows \[m / SI
+    /// unit of the limit\].
     pub rms: f64,
 }
 

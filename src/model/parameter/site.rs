@@ -13,7 +13,7 @@ pub enum ParameterSite {
     Joint {
         /// Index of the joint.
         joint: usize,
-        /// Field of that joint.
+        /// Field of the joint.
         field: JointField,
     },
     /// Field of the beam before a joint.

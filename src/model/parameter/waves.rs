@@ -13,7 +13,7 @@ const MAX_ORDER_STEPS: u32 = 4;
 pub(crate) struct Waves {
     /// Joint and order k of the last harmonic, with its (sin kq, cos kq).
     last: Option<(usize, u32, (f64, f64))>,
-    /// Values (sin q, cos q) of that joint, once they are needed.
+    /// Values (sin q, cos q) of the command q of the joint in `last`; `None` until they are needed.
     first: Option<(f64, f64)>,
 }
 

@@ -70,8 +70,10 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
         n => format!("{n} are far from all measured poses; a ring marks cells where most are"),
     };
     let caption = format!(
-        "Mean bound of measured − predicted that holds with a probability of {level} %, over the \
-         workspace in the frame of the arm's base: pale {} mm, deep {} mm or more. Of {} random \
+        "{level} % bound of the error (measured − predicted), averaged over the configurations \
+         whose \
+         target lies in each cell, in the frame of the arm's base: pale {} mm, deep {} mm or \
+         more. Of {} random \
          configurations within the measured range of each joint, {beyond}.",
         two_digits(least * 1e3, 4),
         two_digits(most * 1e3, 4),
@@ -96,7 +98,7 @@ struct Cell {
     bound: f64,
     /// Number of configurations in the cell.
     count: usize,
-    /// Number of these that are far from all measured poses.
+    /// Number of configurations in the cell that are far from all measured poses.
     extrapolated: usize,
 }
 

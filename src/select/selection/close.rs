@@ -389,8 +389,8 @@ fn fit_with_found(
 }
 
 /// Returns the mean of |`before`| − |`after`|, the errors of the held-out rows of the leading kind
-/// \[m\] or \[rad\], with a bootstrap interval over configurations. If no row is held out, the
-/// errors are those of all identification rows.
+/// (positions, if there are any) \[m\] or \[rad\], with a bootstrap interval over configurations.
+/// If no row is held out, the errors are those of all identification rows.
 fn mean_gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
     let kind = data.measurements.leading().kind();
     let held_out = &data.split.held_out;

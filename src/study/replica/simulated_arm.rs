@@ -12,7 +12,8 @@ use crate::rig::{Draw, NoEquilibrium, Rig, Row, draw};
 /// Relative difference of the error that the rigid fit leaves from the wanted one, below which the
 /// scale of the flexibility is found.
 const SCALE_TOLERANCE: f64 = 1e-4;
-/// Maximum number of flexibility scales tried for a specimen.
+/// Maximum number of flexibility scales that are tried until a rigid fit to a specimen leaves the
+/// wanted error.
 const MAX_SCALE_TRIES: usize = 40;
 
 /// True arm with its simulated measurements.

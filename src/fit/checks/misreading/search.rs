@@ -444,7 +444,8 @@ impl<'a> Trial<'a> {
         self.mean_square(&fitting.position_errors(&rows, x)).sqrt()
     }
 
-    /// Returns those of `rows` that measure the leading kind of quantity.
+    /// Returns those of `rows` that measure the leading kind of quantity (positions, if there are
+    /// any).
     fn of_leading_kind(fitting: &Fitting, rows: &[usize]) -> Vec<usize> {
         let measurements: &Measurements = fitting.measurements;
         let kind = measurements.leading().kind();

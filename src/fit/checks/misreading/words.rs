@@ -411,7 +411,7 @@ impl Misreading {
             Self::Length { joint, field, power } => {
                 write!(
                     f,
-                    "{} that is to be multiplied by {}",
+                    "{} that should be multiplied by {}",
                     entry_name(joint, field),
                     power_of_ten(power)
                 )

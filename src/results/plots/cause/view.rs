@@ -11,7 +11,9 @@ use crate::quantity::Unit;
 use crate::results::plots::arm::Poses;
 
 /// Caption of a figure whose ordinate is the error of one coordinate.
-pub const COORDINATE_CAPTION: &str = "Each dot is the error of this coordinate from one pose alone, with all other parameters as fitted. \
+pub const COORDINATE_CAPTION: &str = "Each dot is the error of the coordinate on the vertical \
+                                      axis that one pose alone gives, with all other parameters \
+                                      as fitted. \
                           Poses with little sensitivity to the coordinate are omitted.";
 /// Caption of a figure whose ordinate is a displacement along that by the effect.
 const DISPLACEMENT_CAPTION: &str = "Each dot is the residual of one pose along the displacement by the effect, with all other parameters \
