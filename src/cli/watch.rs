@@ -123,7 +123,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             }
         } else if watch.has_drifted() {
             format!(
-                "flexcal identify {} --prior {file}{} --out {} takes the drift over into an                  estimate, because the old one errs by more than its bounds say",
+                "flexcal identify {} --prior {file}{} --out {} takes the drift over into an estimate, because the old one errs by more than its bounds say",
                 common.problem_arguments(),
                 drift_argument(arguments.drift),
                 unused_folder(&arguments.estimate, "update")

@@ -45,7 +45,7 @@ pub enum UrdfErrorKind {
     #[error(
         "a joint of type \"{kind}\" is not supported{}; supported types: revolute, continuous, \
          prismatic, fixed; choose a chain without it with --base and --tip",
-        suggestion(kind, &["revolute", "continuous", "prismatic", "fixed"])
+        suggestion(kind, ["revolute", "continuous", "prismatic", "fixed"])
     )]
     Kind { kind: String },
     #[error(

@@ -40,6 +40,6 @@ pub use identify::PriorSource;
 pub use reporter::{Change, WatchedCause};
 #[doc(hidden)]
 pub use update::{Update, update};
-#[doc(hidden)]
 pub(crate) use watch::MIN_EXPECTED_P;
+#[doc(hidden)]
 pub use watch::{Watch, watch};

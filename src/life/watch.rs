@@ -32,6 +32,9 @@ pub(crate) const MIN_EXPECTED_P: f64 = 0.01;
 /// Largest ratio of the errors after a base is registered to those before at which the base counts
 /// as moved, though the rows show another change too.
 const MAX_REGISTERED_ERROR: f64 = 0.05;
+/// Largest root mean square error after a base is registered, in units of the noise, at which the
+/// base counts as moved beside another change: more than that is read wrongly.
+const MAX_REGISTERED_SIGMAS: f64 = 100.0;
 /// Prior odds that something else changed together with a placement (a base, camera or marker),
 /// against the placement alone.
 const SECOND_CHANGE_ODDS: f64 = 0.05;
@@ -88,9 +91,11 @@ impl Watch {
     }
 
     /// Returns true if nothing has changed, but only because drift explains the rows: without drift
-    /// their p-value is below [`MIN_EXPECTED_P`].
+    /// their p-value is below 0.01.
     pub fn has_drifted(&self) -> bool {
-        !self.is_changed() && self.p_without_drift.is_some_and(|p| p < MIN_EXPECTED_P)
+        !self.is_changed()
+            && self.chi2.2 >= MIN_EXPECTED_P
+            && self.p_without_drift.is_some_and(|p| p < MIN_EXPECTED_P)
     }
 
     /// Returns the most probable cause if it can be named: the arm has changed, the probability is
@@ -160,8 +165,8 @@ pub fn watch(
     }
     let undrifted = (days > 0.0).then(|| Earlier::of_estimate(estimate, problem, &model, 0.0));
     let undrifted = undrifted.transpose()?.and_then(|earlier| {
-        let Linearised { rows, factor, causes, .. } = tested.linearised(&poses, &x, &earlier);
-        let assessed = assess(&rows, &factor, &causes, false)?;
+        let Linearised { rows, factor, .. } = tested.linearised(&poses, &x, &earlier);
+        let assessed = assess(&rows, &factor, &[], false)?;
         Some(p_value(assessed.chi2, assessed.coordinates))
     });
     let report = at_estimate.reporter(&leads);
@@ -187,7 +192,7 @@ pub fn watch(
         let at = (&*poses, &x);
         let linear = (assessed.chi2, assessed.looks.last().map_or(0.0, |look| look.1));
         let moved = tested.moved_fixture(at, (&earlier, &leads), threshold, linear);
-        let base = || tested.moved_base(at.0, at.1, (&earlier, &leads), threshold);
+        let base = || tested.moved_base(at, (&earlier, &leads), threshold, linear);
         let moved = moved.or_else(|| base().filter(|_| is_unexplained));
         watched = moved.unwrap_or(watched);
     }
@@ -318,7 +323,8 @@ impl TestedRows<'_> {
     /// Returns a move of the only base as the cause, if it explains the rows: after the base has
     /// been registered to them, ln of the evidence for another change is below `threshold`, or the
     /// errors are a small fraction of those before, so that the base has moved whatever else
-    /// changed. A rotation about the axis of joint 1 may as well be a changed zero of that joint,
+    /// changed. The last argument holds χ² of the unchanged arm and ln of the evidence for all small
+    /// changes. A rotation about the axis of joint 1 may as well be a changed zero of that joint,
     /// which is then returned as a second cause. Returns `None` if the base does not explain the
     /// rows.
     ///
@@ -326,10 +332,10 @@ impl TestedRows<'_> {
     /// by some degrees.
     fn moved_base(
         &self,
-        poses: &[Pose],
-        x: &DVector<f64>,
+        (poses, x): (&[Pose], &DVector<f64>),
         (earlier, leads): (&Earlier, &[bool]),
         threshold: f64,
+        (chi2, linear): (f64, f64),
     ) -> Option<Vec<WatchedCause>> {
         if self.placement.bases.len() != 1 || !positions_determine_base(poses) {
             return None;
@@ -352,17 +358,24 @@ impl TestedRows<'_> {
         let (_, evidence) = *assessed.looks.last()?;
         let is_base = |cause: &&AssessedCause| at_base.causes[cause.cause].kind == CauseKind::Base;
         let base = assessed.causes.iter().find(is_base)?;
-        let before = SensitiveRows::new(self.model, poses.to_vec(), x).residual.norm();
         let is_alone = evidence < threshold;
-        if !is_alone && at_base.rows.residual.norm() > MAX_REGISTERED_ERROR * before {
+        let before = SensitiveRows::new(self.model, poses.to_vec(), x).residual.norm();
+        let after = at_base.rows.residual.norm();
+        let largest = MAX_REGISTERED_SIGMAS * assessed.coordinates.sqrt();
+        if !is_alone && after > largest.min(MAX_REGISTERED_ERROR * before) {
             return None;
         }
+        // The odds of the base, with whatever else changed, against all small changes together.
+        let gain = 0.5 * (chi2 - assessed.chi2) - MIN_RELOCATION_NATS - linear;
         let mut watched = at_base.reporter(leads).cause(base, None);
         for (change, &k) in watched.changes.iter_mut().zip(&at_base.causes[base.cause].columns) {
             change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);
         }
-        watched.probability =
-            if is_alone { 1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp()) } else { 1.0 };
+        watched.probability = if is_alone {
+            1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp())
+        } else {
+            1.0 / (1.0 + (-gain).exp())
+        };
         let frame = |x: &DVector<f64>| model.base_frames(x.as_slice()).into_iter().next();
         let angle = turn_about_first_joint(self.problem, &frame(x)?, &frame(&registered)?);
         let Some(angle) = angle else { return Some(vec![watched]) };

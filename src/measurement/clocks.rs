@@ -47,7 +47,7 @@ pub(super) fn best_shift(times: &[f64], log: &[f64], tolerance: f64) -> Option<f
     let counted: Vec<(usize, f64)> = shifts.map(|shift| (count(shift), shift)).collect();
     let &(most, best) = counted.iter().max_by_key(|(pairs, _)| *pairs)?;
     let is_rival = |&&(pairs, shift): &&(usize, f64)| {
-        (shift - best).abs() > 4.0 * gap && pairs as f64 > MAX_RIVAL_FRACTION * most as f64
+        (shift - best).abs() > 2.0 * gap && pairs as f64 > MAX_RIVAL_FRACTION * most as f64
     };
     let is_clear = most >= MIN_PAIRS && most as f64 >= MIN_PAIRED_FRACTION * tested.len() as f64;
     if !is_clear || counted.iter().any(|counted| is_rival(&counted)) {
@@ -134,7 +134,8 @@ mod tests {
         assert!((shift - 47.03).abs() < 1e-9, "{shift}");
         // Stamps that scatter by more than half a second need a tolerance.
         let slow: Vec<f64> = uneven.iter().map(|time| 6.0 * time).collect();
-        let scattered = |k: usize, time: &f64| time + 73.4 + f64::from(u32::from(k % 2 == 0)) * 1.4;
+        let scattered =
+            |k: usize, time: &f64| time + 73.4 + if k.is_multiple_of(2) { 1.4 } else { 0.0 };
         let late: Vec<f64> = slow.iter().enumerate().map(|(k, time)| scattered(k, time)).collect();
         assert_eq!(best_shift(&late, &slow, 0.5), None);
         let shift = best_shift(&late, &slow, 2.0).unwrap_or(0.0);

@@ -12,7 +12,7 @@ use crate::fit::{
 };
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
-use crate::problem::{Observation, Problem};
+use crate::problem::Problem;
 
 /// Largest change of a target's correction \[m\] from one pass to the next at which the commands
 /// have converged; far below the accuracy of any arm.
@@ -61,12 +61,6 @@ pub fn predict(
     let all_rows: Vec<usize> = (0..rows.len()).collect();
     let mut poses = placement.poses(rows, &all_rows, correction.sigma);
     estimate.count_time_in(&placement, &mut poses);
-    // Every row of the arm has the uncertainty of a position, whatever it measures.
-    for pose in poses.iter_mut().filter(|pose| pose.observation.is_of_arm()) {
-        if !pose.observation.is_of_position() {
-            (pose.observation, pose.sigma) = (Observation::Position, correction.sigma);
-        }
-    }
     let is_placed = |k: &usize| prediction.placed.contains(&model.parameters[*k].name);
     let placed: Vec<usize> = (0..model.parameters.len()).filter(is_placed).collect();
     let corrected = correction.at((problem, &model, &prediction.x), &placed, &poses);

@@ -14,7 +14,7 @@ use super::training_rows::TrainingRows;
 use crate::fit::Identification;
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
-use crate::problem::{PoseView, Problem};
+use crate::problem::{Observation, PoseView, Problem};
 
 /// Smallest part of the correction that is applied at a pose, 0 to 1, at which the pose does not
 /// count as extrapolated.
@@ -183,8 +183,10 @@ impl Correction {
     /// Returns the corrections of `poses`, with the arm at the full parameter vector `x` of
     /// `model`. They are NaN for poses without equilibrium.
     ///
-    /// The parameters `placed` of bases and tools are fitted to the corrected poses that use them.
-    /// The part of the correction that this fit reproduces is removed from mean and covariance.
+    /// A pose of the arm that measures less than a position gets the correction of the position,
+    /// too. The parameters `placed` of bases and tools are fitted to the corrected positions that
+    /// use them. The part of the correction that this fit reproduces is removed from mean and
+    /// covariance.
     pub(crate) fn at(
         &self,
         (problem, model, x): (&Problem, &Model, &DVector<f64>),
@@ -193,6 +195,12 @@ impl Correction {
     ) -> Vec<CorrectedPose> {
         let shared = self.shared_parameters(model, x);
         let placed = PlacementFit::new((problem, model, x), placed, poses);
+        let mut poses = poses.to_vec();
+        for pose in &mut poses {
+            if pose.observation.is_of_arm() && !pose.observation.is_of_position() {
+                (pose.observation, pose.sigma) = (Observation::Position, self.sigma);
+            }
+        }
         let of_chunk = |poses: &[Pose]| self.factors(&shared, (problem, model, x), poses);
         let chunks = || {
             poses.chunks(POSES_PER_CHUNK).enumerate().map(|(k, poses)| (POSES_PER_CHUNK * k, poses))

@@ -207,7 +207,15 @@ fn training_rows(
     let FittedRows { positions, others } = fitted_rows(found, data);
     let times = (found.sigma, &found.start_times);
     let poses = timed_poses(&data.measurements, &positions, times);
-    let others = timed_poses(&data.measurements, &others, times);
+    if positions.is_empty() {
+        return None;
+    }
+    // The fit took the noise of all rows of the arm as this much larger than declared.
+    let excess = found.noise_factor.sqrt();
+    let mut others = timed_poses(&data.measurements, &others, times);
+    for pose in others.iter_mut().filter(|pose| pose.observation.is_of_arm()) {
+        pose.sigma *= excess;
+    }
     let takes_remainder = !others.iter().any(|pose| pose.observation.is_of_arm());
     let is_free = |k: &usize| {
         let estimate = &found.estimates[*k];
@@ -225,7 +233,9 @@ fn training_rows(
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
     let is_usable = finite(rows.residual.as_slice())
         && finite(rows.jacobian.as_slice())
-        && finite(rows.sites.as_slice());
+        && finite(rows.sites.as_slice())
+        && finite(slopes.as_slice())
+        && finite(residuals.as_slice());
     // Parameters that move none of these rows, such as bases of held-out sessions, are left out.
     let is_seen = |j: &usize| [&rows.jacobian, &slopes].iter().any(|of| of.column(*j).amax() > 0.0);
     let seen: Vec<usize> = (0..slopes.ncols()).filter(is_seen).collect();

@@ -31,7 +31,7 @@ pub(super) struct CorrectionProducts {
 
 impl PlacementFit {
     /// Linearises the rows `poses` in the parameters `placed` of bases and tools, with the arm at
-    /// the full parameter vector `x` of `model`.
+    /// the full parameter vector `x` of `model`. Rows that measure no position take no part.
     pub fn new(
         (problem, model, x): (&Problem, &Model, &DVector<f64>),
         placed: &[usize],
@@ -42,7 +42,13 @@ impl PlacementFit {
         }
         let linearisation =
             Linearisation { problem, model, x, unknowns: placed.to_vec(), sigma: 1.0 };
-        Self { basis: orthonormal(linearisation.jacobian(poses.to_vec())) }
+        let mut columns = linearisation.jacobian(poses.to_vec());
+        for (row, pose) in poses.iter().enumerate() {
+            if !pose.observation.is_of_position() {
+                columns.rows_mut(AXES * row, AXES).fill(0.0);
+            }
+        }
+        Self { basis: orthonormal(columns) }
     }
 
     /// Returns true if at least one direction of bases or tools is fitted.

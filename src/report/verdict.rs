@@ -1,6 +1,8 @@
 //! Sentences about the outcome of a loop: its verdict, and the title of each cause. No sentence
 //! claims more than the status of the cause allows.
 
+use std::fmt::Write as _;
+
 use super::document::{MIN_PROBABLE, code, percent};
 use crate::quantity::format::{counted, number};
 use crate::results::{AlternativeEffect, FoundEffect, LoopResult, NamedEffect};
@@ -44,7 +46,7 @@ pub(super) fn verdict(
     let is_settled = result.verdict != Verdict::Unexplained || result.is_probably_explained();
     if result.trusted && is_settled && !reservations.is_empty() {
         outcome.truncate(outcome.trim_end_matches('.').len());
-        outcome += &format!(", but {}.", reservations.join("; "));
+        let _ = write!(outcome, ", but {}.", reservations.join("; "));
     }
     end + caution + &outcome
 }

@@ -195,13 +195,6 @@ fn of_other_rows(fit: &CheckedFit, before: f64) -> Option<Finding> {
         other_rows(fit, &joints)?;
     let rows = fit.fitting.measurements;
     let names: Vec<String> = found.iter().map(|&joint| column_name(rows, joint)).collect();
-    // A sorted column of a joint that moves the target most hides the others.
-    let sorted: Vec<usize> =
-        joints.iter().copied().filter(|&joint| is_sorted(&commands(rows, joint))).collect();
-    let names = match sorted.as_slice() {
-        &[only] => vec![column_name(rows, only)],
-        _ => names,
-    };
     let (text, remedy) = if names.len() == joints.len() {
         let text = format!(
             "the positions do not depend on the joint angles of their rows (R² of their distances is \

@@ -295,18 +295,6 @@ impl fmt::Display for Misreading {
                 let ratio = f64::from(percent) / 100.0;
                 write!(f, "joint {joint} that turns by {ratio} times its command")
             }
-            Self::HeldTarget => f.write_str(
-                "a target that lies elsewhere than [tool] declares (correct it there, or free it in [parameters]: \"tool.*\" = { free = true })",
-            ),
-            Self::HeldBase => f.write_str(
-                "a base that stands elsewhere than declared (free it in [parameters]: \"base.*\" = { free = true })",
-            ),
-            Self::TargetInMillimetres => {
-                f.write_str("a target of [tool] that is in millimetres, declared in metres")
-            }
-            Self::ArmInMillimetres => {
-                f.write_str("lengths of joints that are in millimetres, declared in metres")
-            }
             _ => self.fmt_of_loads(f),
         }
     }
@@ -367,6 +355,18 @@ impl Misreading {
                     "gravity that points along {sign}{} (gravity_m_s2)",
                     ['x', 'y', 'z'][axis]
                 )
+            }
+            Self::HeldTarget => f.write_str(
+                "a target that lies elsewhere than [tool] declares (correct it there, or free it in [parameters]: \"tool.*\" = { free = true })",
+            ),
+            Self::HeldBase => f.write_str(
+                "a base that stands elsewhere than declared (free it in [parameters]: \"base.*\" = { free = true })",
+            ),
+            Self::TargetInMillimetres => {
+                f.write_str("a target of [tool] that is in millimetres, declared in metres")
+            }
+            Self::ArmInMillimetres => {
+                f.write_str("lengths of joints that are in millimetres, declared in metres")
             }
             _ => self.fmt_of_table(f),
         }
