@@ -153,8 +153,9 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         let is_limit = |set: &&Set| !set.has_wide(blocks) || products.has_gear(&set.members);
         let can_grow = evaluated.values().filter(is_limit);
         let best_known = can_grow.map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
-        let mut sets: Vec<&Set> = next.values().collect();
-        sets.sort_by(|a, b| best_first(a, b));
+        let mut sets: Vec<Set> = next.values().cloned().collect();
+        evaluated.extend(next);
+        sets.sort_by(best_first);
         promising.get_or_insert_with(|| {
             let mut promising: Vec<usize> = Vec::new();
             for last in sets.iter().filter_map(|set| set.members.last()) {
@@ -166,9 +167,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         });
         sets.retain(|set| !set.has_wide(blocks));
         sets.truncate(BEAM_WIDTH);
-        front = sets.into_par_iter().map(|set| set.clone().settled(products)).collect();
+        front = sets.into_par_iter().map(|set| set.settled(products)).collect();
         front.sort_by(best_first);
-        evaluated.extend(next);
         evaluated.extend(front.iter().map(|set| (set.key(), set.clone())));
         if front.first().is_none_or(|best| best.ln_posterior < best_known - LOG_ODDS_CUTOFF) {
             break;
@@ -177,13 +177,9 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
     add_replacements(&mut evaluated, products);
     add_periodic_errors(&mut evaluated, products);
     let mut likely: Vec<&Set> = evaluated.values().collect();
-    if likely.len() > MAX_SETTLED_SETS {
-        let order = |a: &&Set, b: &&Set| best_first(a, b).then_with(|| a.key().cmp(&b.key()));
-        likely.select_nth_unstable_by(MAX_SETTLED_SETS, order);
-        likely.truncate(MAX_SETTLED_SETS);
-    }
-    let settled: Vec<Set> =
-        likely.into_par_iter().map(|set| set.clone().settled(products)).collect();
+    likely.sort_by(|a, b| best_first(a, b));
+    let likely: Vec<Set> = likely.into_iter().take(MAX_SETTLED_SETS).cloned().collect();
+    let settled: Vec<Set> = likely.into_par_iter().map(|set| set.settled(products)).collect();
     evaluated.extend(settled.into_iter().map(|set| (set.key(), set)));
     let most = evaluated.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = evaluated.values().map(|set| (set.ln_posterior - most).exp()).sum();
@@ -259,9 +255,9 @@ fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Produc
     for _ in 0..MAX_EXCHANGES {
         let mut likely: Vec<&Set> =
             evaluated.values().filter(|set| !set.has_wide(blocks)).collect();
-        let best = likely.iter().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
-        likely.retain(|set| set.ln_posterior > best - LOG_ODDS_CUTOFF);
         likely.sort_by(|a, b| best_first(a, b));
+        let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
+        likely.retain(|set| set.ln_posterior > best - LOG_ODDS_CUTOFF);
         let is_surface = |member: &usize| blocks[*member].is_surface;
         let surfaces = likely
             .iter()
