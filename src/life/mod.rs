@@ -40,6 +40,7 @@ pub use identify::PriorSource;
 pub use reporter::{Change, WatchedCause};
 #[doc(hidden)]
 pub use update::{Update, update};
-pub(crate) use watch::MIN_EXPECTED_P;
 #[doc(hidden)]
 pub use watch::{Watch, watch};
+
+pub(crate) use watch::MIN_EXPECTED_P;

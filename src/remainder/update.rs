@@ -109,8 +109,7 @@ impl EarlierCorrections {
     /// Returns the corrections for the estimate `found`, with `since` as the change since the
     /// earlier estimate and the identification rows of `data` as new rows.
     ///
-    /// Rows that measure no position do not condition the corrections; other
-    /// rows informed the earlier ones. `None` if a matrix is not
+    /// Rows that measure no position do not condition the corrections. `None` if a matrix is not
     /// positive definite because of rounding.
     ///
     /// # Errors

@@ -20,8 +20,9 @@ fn arm() -> (Problem, Dataset) {
 fn named(problem: &Problem, data: &Dataset, code: FindingCode) -> String {
     let found = fit_as_command(problem, data);
     assert!(!found.is_trusted(), "{:?}", found.findings);
-    let finding = found.finding(code).unwrap_or_else(|| panic!("{:?}", found.findings));
-    finding.to_string()
+    let finding = found.finding(code).map(ToString::to_string);
+    assert!(finding.is_some(), "{:?}", found.findings);
+    finding.unwrap_or_default()
 }
 
 #[test]
@@ -51,11 +52,14 @@ fn tenths_of_degrees_are_named() {
     assert!(words.contains("joint angles that are tenths of a degree"), "{words}");
 }
 
+/// Change of one measured position.
+type Mistake = fn(&mut Vector3<f64>);
+
 #[test]
 fn coordinates_are_told_apart_where_the_base_is_held() {
     let problem = parse(&text(PRIORS));
     let clean = measured(&problem, 8);
-    let mistakes: [(fn(&mut Vector3<f64>), &str); 2] = [
+    let mistakes: [(Mistake, &str); 2] = [
         (|at| at.y = -at.y, "y of the positions that has the other sign"),
         (|at| at.swap_rows(0, 1), "x and y of the positions that are exchanged"),
     ];

@@ -197,7 +197,7 @@ finding_codes! {
         "Bounds or constraints cause most of a misfit that contradicts the declared σ: without them less than half of the error remains.",
         "check these limits";
     HeldParameter: Warning "held-parameter" ["parameter", "alike", "before", "after"]
-        "A parameter of the geometry that the problem holds explains most of a misfit that contradicts the declared σ: free, it takes away more than four fifths of what noise does not explain.",
+        "A parameter of the geometry that the problem holds explains most of a misfit that contradicts the declared σ: free, it takes away more than four fifths of what noise does not explain, or the six of a base together more than half.",
         "free this parameter in [parameters]";
     InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]
         "A few rows cause most of the misfit.",

@@ -1,5 +1,7 @@
 //! Check of the geometry that the problem holds at its nominal values.
 
+use std::collections::BTreeMap;
+
 use nalgebra::DVector;
 use serde_json::json;
 
@@ -164,15 +166,16 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
     Some(Finding::new(FindingCode::HeldParameter, numbers, text).with_remedy(remedy))
 }
 
-/// Returns how far the base moved in a fit.
+/// Returns how far the base moved in a fit: the largest shift and turn of all sessions.
 fn shown_base(fitting: &Fitting, end: &FitEnd) -> String {
-    let mut moved = [0.0_f64; 2];
+    let mut squares: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
     for (parameter, x) in fitting.model.parameters.iter().zip(&end.x) {
-        if let ParameterSite::Base { axis, .. } = parameter.site {
-            moved[usize::from(axis >= 3)] += x * x;
+        if let ParameterSite::Base { base, axis } = parameter.site {
+            squares.entry(base).or_default()[usize::from(axis >= 3)] += x * x;
         }
     }
-    let [shift, turn] = moved.map(f64::sqrt);
+    let largest = |k: usize| squares.values().map(|of| of[k]).fold(0.0, f64::max).sqrt();
+    let [shift, turn] = [largest(0), largest(1)];
     format!("{:.3} mm and {:.4}°", shift * 1e3, turn.to_degrees())
 }
 

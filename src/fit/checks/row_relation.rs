@@ -38,8 +38,9 @@ pub(super) struct OtherRows {
 /// Pairs of rows with their regressors.
 struct Pairs {
     rows: Vec<[usize; 2]>,
-    /// Configurations, one for each row, with the kind of each joint.
+    /// Configurations, one for each row.
     configurations: Vec<Vec<f64>>,
+    /// Index of each joint, and whether it is revolute.
     joints: Vec<(usize, bool)>,
 }
 

@@ -26,8 +26,8 @@ impl ClosedLoop {
     /// effects then stay only if left-out configurations are predicted better with them by more
     /// than chance. Otherwise they become structure without a law. They always stay if the verdict
     /// is [`Verdict::Explained`], if measured orientations are fitted, if data contradict an effect,
-    /// or if the fit with or without them is not trusted: effects of such a fit are uncertain only
-    /// because of it.
+    /// if the fit without them is not trusted, or if the fit with them does not describe the arm,
+    /// which makes all of its effects uncertain.
     ///
     /// # Errors
     /// Returns an error if `data` are not those of the loop.
