@@ -365,8 +365,9 @@ impl TestedRows<'_> {
         if !is_alone && after > largest.min(MAX_REGISTERED_ERROR * before) {
             return None;
         }
-        // The odds of the base, with whatever else changed, against all small changes together.
-        let gain = 0.5 * (chi2 - assessed.chi2) - MIN_RELOCATION_NATS - linear;
+        // ln of the odds of the base with another change, against all small changes together.
+        let both = evidence + SECOND_CHANGE_ODDS.ln();
+        let gain = 0.5 * (chi2 - assessed.chi2) - MIN_RELOCATION_NATS + both - linear;
         let mut watched = at_base.reporter(leads).cause(base, None);
         for (change, &k) in watched.changes.iter_mut().zip(&at_base.causes[base.cause].columns) {
             change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);

@@ -47,7 +47,7 @@ fn a_plan_can_be_checked_and_measured() {
             "20 poses, from 60 candidates",
             "joint2.stiffness",
             "times smaller",
-            "rank 31 of 32",
+            "these determine 31 of 32",
             "plan.csv",
         ],
     );

@@ -80,7 +80,7 @@ finding_codes! {
         "measure more poses of this session, or give its base a prior";
     Misread: Error "misread" ["explanations", "before", "after"]
         "With another reading of the table or the problem, less than a fifth of the error remains, or no more than noise.",
-        "correct the table or the problem accordingly";
+        "correct units, signs, order or convention in the table or the problem";
     ViewsReversed: Error "views-reversed" ["views", "before", "after"]
         "Some views number the points of a marker from the other end.",
         "reverse the column point in these views or leave them out; a board that looks different after half a turn prevents it";
