@@ -362,12 +362,11 @@ impl TestedRows<'_> {
         let before = SensitiveRows::new(self.model, poses.to_vec(), x).residual.norm();
         let after = at_base.rows.residual.norm();
         let largest = MAX_REGISTERED_SIGMAS * assessed.coordinates.sqrt();
-        if !is_alone && after > largest.min(MAX_REGISTERED_ERROR * before) {
-            return None;
-        }
         // ln of the odds of the base with another change, against all small changes together.
         let both = evidence + SECOND_CHANGE_ODDS.ln();
         let gain = 0.5 * (chi2 - assessed.chi2) - MIN_RELOCATION_NATS + both - linear;
+        let is_small = after <= largest.min(MAX_REGISTERED_ERROR * before);
+        (is_alone || is_small && gain > 0.0).then_some(())?;
         let mut watched = at_base.reporter(leads).cause(base, None);
         for (change, &k) in watched.changes.iter_mut().zip(&at_base.causes[base.cause].columns) {
             change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);

@@ -45,9 +45,8 @@ pub fn commands_text(
         );
     }
     if let Some(bounds) = bounds.filter(|_| result.reached > 0) {
-        let sentence = bound_sentence(bounds, None);
-        let size = sentence.trim_start_matches("Expected error");
-        let _ = write!(words, ".\nExpected error of the corrected commands{size}");
+        let what = "Expected error of the corrected commands";
+        let _ = write!(words, ".\n{}", bound_sentence(what, bounds, None));
     } else if result.reached > 0 {
         words += ".\nThe expected error of the commands is not known, because the estimate states no uncertainty of positions.";
     }

@@ -63,7 +63,8 @@ pub(crate) fn prediction(
     blocks.extend(fitted_rows_sentence(prediction, fitted).map(Block::Text));
     blocks.extend(compared.map(|compared| {
         let suffices = 3 * compared.errors.len() > prediction.placed.len();
-        Block::lines(bound_sentence(compared.bounds, Some(compared).filter(|_| suffices)))
+        let measured = Some(compared).filter(|_| suffices);
+        Block::lines(bound_sentence("Expected error", compared.bounds, measured))
     }));
     let unsteady = unsteady_points(&prediction.spreads);
     if !unsteady.is_empty() {

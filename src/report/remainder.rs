@@ -266,15 +266,16 @@ fn are_predicted(bounds: &Bounds, errors: &[(usize, f64)]) -> bool {
         && largest <= MAX_COMPUTED_ERROR * bounds.expected()
 }
 
-/// States the expected error and its bound, both as root mean squares over the poses. With
+/// States the expected error, which `what` names, and its bound, both as root mean squares over the
+/// poses. With
 /// `compared`, adds the share of rows within their bounds and what the test says.
-pub(super) fn bound_sentence(bounds: &Bounds, compared: Option<Compared>) -> String {
+pub(super) fn bound_sentence(what: &str, bounds: &Bounds, compared: Option<Compared>) -> String {
     let compared = compared.filter(|compared| !compared.errors.is_empty());
     let test = compared.and_then(|compared| compared.test);
     let squares = (0..bounds.poses.len()).map(|pose| bounds.bound(pose).powi(2));
     let bound = (squares.sum::<f64>() / bounds.poses.len() as f64).sqrt();
     let mut words = format!(
-        "Expected error {} mm rms, measurement noise included; the {} % bound is {} mm rms",
+        "{what} {} mm rms, measurement noise included; the {} % bound is {} mm rms",
         number(bounds.expected() * 1e3, 3),
         percent_of(bounds.level),
         number(bound * 1e3, 3),
