@@ -53,7 +53,7 @@ enum PosesError {
 /// prints the forecast.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let problem = Problem::read(common.problem())?;
+    let problem = common.read_problem()?;
     let results = common.results(
         "check",
         &problem,

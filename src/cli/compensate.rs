@@ -7,7 +7,6 @@ use clap::Args;
 use flexcal::error::{InputError, InputErrorKind, TableErrorKind};
 use flexcal::fit;
 use flexcal::measurement::Measurements;
-use flexcal::problem::Problem;
 use flexcal::remainder::{self, Compensation, TargetFrame};
 use flexcal::report::{self, Doubts, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
@@ -79,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if common.data().is_empty() {
         return Err(NoTargets.into());
     }
-    let mut problem = Problem::read(common.problem())?;
+    let mut problem = common.read_problem()?;
     // Every row is a target, so none is held out.
     problem.data.held_out = None;
     let results = common.results(

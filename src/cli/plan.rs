@@ -74,7 +74,7 @@ const CRITERIA: [(&str, &str, Criterion); 5] = [
 /// accuracy that the plan is expected to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
-    let declared = Problem::read(common.problem())?;
+    let declared = common.read_problem()?;
     if declared.data.fits_orientation && !arguments.separate.is_empty() {
         common.hint(["effects are told apart by positions: orientations do not count"]);
     }

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::assessment::AssessedCause;
 use super::causes::{Cause, CauseKind};
 use super::evidence::Unchanged;
+use super::identify::WIDE_SIGMA;
 use super::onset::{padded_factor, sums_of};
 use super::rows::SensitiveRows;
 use crate::quantity::Unit;
@@ -62,7 +63,10 @@ pub struct Change {
 /// Rows and causes from which the report of a cause is computed.
 pub(super) struct Reporter<'a> {
     pub rows: &'a SensitiveRows,
+    /// Matrix F with F Fᵀ the covariance of the estimate.
     pub factor: &'a DMatrix<f64>,
+    /// Columns of bases and targets that the estimate does not know, such as those of a new session.
+    pub unknown: &'a [usize],
     pub causes: &'a [Cause],
     /// True for rows of the leading kind (positions, if there are any), whose errors are reported.
     pub leads: &'a [bool],
@@ -125,12 +129,22 @@ impl Reporter<'_> {
         (chosen.iter().map(square).sum::<f64>() / chosen.len().max(1) as f64).sqrt()
     }
 
+    /// Returns a factor of a covariance without the variance of what the estimate does not know.
+    pub fn known_factor(&self, factor: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut known = factor.clone();
+        self.unknown.iter().for_each(|&k| known.row_mut(k).fill(0.0));
+        known
+    }
+
     /// Returns the root mean square error of the rows of the leading kind (positions, if there are
     /// any), each predicted with the changes of the cause as estimated without the row's group.
     /// `None` if a number is not finite.
     fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
-        let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
-        let (rows, factor) = (&rows, padded_factor(self.factor, columns.len()));
+        let (rows, mut columns) = self.rows.masked_before(assessed.onset, &cause.columns);
+        let (rows, factor) = (&rows, padded_factor(&self.known_factor(self.factor), columns.len()));
+        // What the estimate does not know is estimated from the rows together with the cause.
+        columns.extend(self.unknown);
+        let sizes = [&*assessed.sizes, &vec![WIDE_SIGMA; self.unknown.len()]].concat();
         let sums = sums_of(rows);
         let groups = rows.len().min(MAX_GROUPS);
         let means: Option<Vec<DVector<f64>>> = (0..groups)
@@ -138,7 +152,7 @@ impl Reporter<'_> {
                 let mut others = sums.clone();
                 (group..rows.len()).step_by(groups).for_each(|row| others.add(rows, row, -1.0));
                 let unchanged = Unchanged::new(&others, &factor)?;
-                Some(unchanged.likelihood_ratio(&columns, &assessed.sizes)?.1)
+                Some(unchanged.likelihood_ratio(&columns, &sizes)?.1)
             })
             .collect();
         let means = means?;

@@ -93,6 +93,16 @@ impl SensitiveRows {
         self.sigma[row] * misfit.hypot(1.0)
     }
 
+    /// Returns 1 σ of each measured coordinate of a row in units of its noise: noise, misfit, and the
+    /// uncertainty of an estimate with the covariance F Fᵀ, F = `factor`.
+    pub fn expected_errors(&self, row: usize, factor: &DMatrix<f64>) -> DVector<f64> {
+        let of_estimate = self.of_row(row).columns(0, factor.nrows()) * factor;
+        DVector::from_fn(self.coordinates[row], |coordinate, _| {
+            let misfit = self.misfit_of(row, coordinate).map_or(0.0, |(_, sigma)| sigma);
+            of_estimate.row(coordinate).norm().hypot(misfit).hypot(1.0)
+        })
+    }
+
     /// Returns the configuration of a row and the 1 σ of the misfit of one of its coordinates, in
     /// units of the noise; `None` without a misfit.
     fn misfit_of(&self, row: usize, coordinate: usize) -> Option<(usize, f64)> {
