@@ -4,12 +4,10 @@ use nalgebra::DMatrix;
 
 use super::assessment::{AssessedCause, Assessment, Weighted, weighted_cause};
 use super::causes::{Cause, CauseKind, Trial};
-use super::evidence::{Unchanged, ln_sum};
+use super::evidence::{SECOND_CHANGE_ODDS, Unchanged, ln_sum};
 use super::onset::sums_of;
 use super::rows::SensitiveRows;
 
-/// Prior odds that two things changed together, against one thing alone.
-pub(super) const SECOND_CHANGE_ODDS: f64 = 0.05;
 /// Maximum number of causes of which all pairs are tried: those with the largest evidence.
 const MAX_PAIRED_CAUSES: usize = 40;
 

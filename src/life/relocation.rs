@@ -5,7 +5,7 @@
 
 use nalgebra::{DVector, Rotation3, Vector3};
 
-use super::pairs::SECOND_CHANGE_ODDS;
+use super::evidence::SECOND_CHANGE_ODDS;
 use super::rows::SensitiveRows;
 use crate::fit::register;
 use crate::model::parameter::{Parameter, ParameterSite};
