@@ -119,6 +119,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // An error of the remainder's file is reported only after errors of the estimate, which explain
     // more.
     correction?;
+    common.hint(estimate.measurement_scale().map(|scale| {
+        format!(
+            "targets are true positions: the problem says that the measurement reads them {:.3} mm per metre too far apart (tracker-scale); \
+             if the arm errs instead, so do the commands",
+            1e3 * scale
+        )
+    }));
     if found.is_base_open {
         common.hint([
             "the estimate does not know where the arm's base is in the measuring frame, so targets in that frame are reached as far as it \

@@ -205,7 +205,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let is_structured = shown.residual_tests.is_structured();
         let estimate = results.path("estimate.json");
         let next = advice::after_fit(common, (&problem, &identification), is_structured, &estimate);
-        format!("{told}{words}{sources}{}Next: {next}\n", results.written())
+        let turns = Common::orientation_line(&problem, &data.measurements);
+        format!("{told}{turns}{words}{sources}{}Next: {next}\n", results.written())
     })?;
     if let (Some(words), true, false) = (&sources, common.json, common.quiet) {
         diagnostic::warn(words);

@@ -197,6 +197,16 @@ impl Common {
         }
     }
 
+    /// Returns a line of text that says that the orientations of a table are not fitted; empty if
+    /// they are, or if it has none.
+    pub fn orientation_line(problem: &Problem, rows: &Measurements) -> &'static str {
+        if rows.orientations.is_some() && !problem.data.fits_orientation {
+            "\nThe orientations in the table are not fitted: orientation_sigma_deg in [data], their 1 σ, fits them.\n"
+        } else {
+            ""
+        }
+    }
+
     /// Prints a warning if the problem fits orientations, which the search for effects ignores.
     /// Adds the warning to `data` for the reports.
     pub fn warn_of_orientation(&self, problem: &Problem, data: &mut Dataset) {

@@ -18,6 +18,7 @@ use super::estimate::Trust;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::Results;
+use super::plan::columns_at_hand;
 use super::poses::{Region, Source};
 use super::progress::Line;
 use super::{diagnostic, interrupt, values};
@@ -290,10 +291,12 @@ fn next_step(
             "take an image in each of these poses, write a row for each point that is found, then"
                 .to_owned()
         }
-        [first, ..] => format!(
-            "measure {these}, add the columns x_mm, y_mm, z_mm and the others of {}, then",
-            first.display()
-        ),
+        [_, ..] => {
+            let at_hand: Vec<&PathBuf> = files.iter().collect();
+            let others = columns_at_hand(&at_hand, (problem, &next.poses), false);
+            let others: String = others.iter().map(|name| format!(", {name}")).collect();
+            format!("measure {these}, add the columns x_mm, y_mm, z_mm{others}, then")
+        }
         [] => format!("measure {these}, add the columns x_mm, y_mm, z_mm, then"),
     };
     let measured: Vec<String> = files.iter().map(|file| shell_word(file)).collect();

@@ -65,6 +65,8 @@ pub(super) struct Reporter<'a> {
     pub rows: &'a SensitiveRows,
     /// Matrix F with F Fᵀ the covariance of the estimate.
     pub factor: &'a DMatrix<f64>,
+    /// The same without drift.
+    pub undrifted: &'a DMatrix<f64>,
     /// Columns of bases and targets that the estimate does not know, such as those of a new session.
     pub unknown: &'a [usize],
     pub causes: &'a [Cause],
@@ -129,11 +131,19 @@ impl Reporter<'_> {
         (chosen.iter().map(square).sum::<f64>() / chosen.len().max(1) as f64).sqrt()
     }
 
-    /// Returns a factor of a covariance without the variance of what the estimate does not know.
-    pub fn known_factor(&self, factor: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut known = factor.clone();
+    /// Returns the factor of the covariance without drift and without the variance of what the
+    /// estimate does not know.
+    fn known_factor(&self) -> DMatrix<f64> {
+        let mut known = self.undrifted.clone();
         self.unknown.iter().for_each(|&k| known.row_mut(k).fill(0.0));
         known
+    }
+
+    /// Returns the root mean square error of the rows of the leading kind that noise, the known
+    /// misfit and the uncertainty of the estimate without drift give \[m\] or \[rad\].
+    pub fn expected_error(&self) -> f64 {
+        let known = self.known_factor();
+        self.rms(|row| self.rows.expected_errors(row, &known))
     }
 
     /// Returns the root mean square error of the rows of the leading kind (positions, if there are
@@ -141,10 +151,15 @@ impl Reporter<'_> {
     /// `None` if a number is not finite.
     fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
         let (rows, mut columns) = self.rows.masked_before(assessed.onset, &cause.columns);
-        let (rows, factor) = (&rows, padded_factor(&self.known_factor(self.factor), columns.len()));
-        // What the estimate does not know is estimated from the rows together with the cause.
+        // What the estimate does not know, and its uncertainty, are estimated together with the
+        // cause, because errors of the estimate may compensate each other.
+        let known = self.known_factor();
+        let (rows, carried) = &rows.with_columns(&(self.rows.columns(&known) * &known));
         columns.extend(self.unknown);
-        let sizes = [&*assessed.sizes, &vec![WIDE_SIGMA; self.unknown.len()]].concat();
+        columns.extend(carried.clone());
+        let unknown = vec![WIDE_SIGMA; self.unknown.len()];
+        let sizes = [&*assessed.sizes, &unknown, &vec![1.0; carried.len()]].concat();
+        let factor = DMatrix::zeros(rows.sensitivity.ncols(), 1);
         let sums = sums_of(rows);
         let groups = rows.len().min(MAX_GROUPS);
         let means: Option<Vec<DVector<f64>>> = (0..groups)

@@ -174,6 +174,20 @@ impl SensitiveRows {
         (masked, (before..before + added).collect())
     }
 
+    /// Returns the sensitivities to the first parameters, as many as `factor` has rows.
+    pub fn columns(&self, factor: &DMatrix<f64>) -> DMatrix<f64> {
+        self.sensitivity.columns(0, factor.nrows()).into_owned()
+    }
+
+    /// Returns the rows with `added` columns appended, and their indices.
+    pub fn with_columns(&self, added: &DMatrix<f64>) -> (Self, Vec<usize>) {
+        let (before, mut extended) = (self.sensitivity.ncols(), self.clone());
+        let after = before + added.ncols();
+        extended.sensitivity = extended.sensitivity.resize_horizontally(after, 0.0);
+        extended.sensitivity.columns_mut(before, added.ncols()).copy_from(added);
+        (extended, (before..after).collect())
+    }
+
     /// Returns the sum over all residuals of the variance of the shared misfit, in units of the
     /// noise variance; 0 without a misfit.
     pub fn sum_of_misfit_variances(&self) -> f64 {

@@ -180,8 +180,8 @@ pub fn watch(
         let assessed = assess(rows, factor, &[], false)?;
         Some(p_value(assessed.chi2, assessed.coordinates))
     });
-    let report = at_estimate.reporter(&leads);
-    let expected = report.known_factor(&undrifted.as_ref().unwrap_or(&at_estimate).factor);
+    let undrifted = &undrifted.as_ref().unwrap_or(&at_estimate).factor;
+    let report = at_estimate.reporter(&leads, undrifted);
     let reported: Vec<&AssessedCause> = assessed
         .causes
         .iter()
@@ -221,7 +221,7 @@ pub fn watch(
         days,
         p_without_drift,
         error: report.rms(|row| at_estimate.rows.residual_of(row)),
-        expected_error: report.rms(|row| at_estimate.rows.expected_errors(row, &expected)),
+        expected_error: report.expected_error(),
         unit: kind_named(leading.kind()).unit,
         sigma: leads
             .iter()
@@ -276,10 +276,11 @@ struct Linearised {
 }
 
 impl Linearised {
-    /// Returns the reporter of these causes; `leads` is true for rows of the leading kind.
-    fn reporter<'a>(&'a self, leads: &'a [bool]) -> Reporter<'a> {
+    /// Returns the reporter of these causes; `leads` is true for rows of the leading kind, and
+    /// `undrifted` is the factor of the covariance without drift.
+    fn reporter<'a>(&'a self, leads: &'a [bool], undrifted: &'a DMatrix<f64>) -> Reporter<'a> {
         let Self { rows, factor, unknown, causes, .. } = self;
-        Reporter { rows, factor, unknown, causes, leads }
+        Reporter { rows, factor, undrifted, unknown, causes, leads }
     }
 }
 
@@ -348,7 +349,7 @@ impl TestedRows<'_> {
             let (probability, gain) = of_place.weighed(threshold, (chi2, linear))?;
             // A single change of the place is compared with the small changes by χ² alone.
             let is_explained = of_place.evidence >= threshold || gain > linear;
-            let mut watched = at_place.reporter(leads).cause(moved, None);
+            let mut watched = at_place.reporter(leads, &at_place.factor).cause(moved, None);
             for (change, &k) in watched.changes.iter_mut().zip(&placed.parameters) {
                 change.change += at_place.extended.x[k] - x[k];
             }
@@ -397,7 +398,7 @@ impl TestedRows<'_> {
         let base = assessed.causes.iter().find(is_base)?;
         let of_place = self.of_place(poses, x, &at_base, &assessed);
         let (probability, _) = of_place.weighed(threshold, (chi2, linear))?;
-        let mut watched = at_base.reporter(leads).cause(base, None);
+        let mut watched = at_base.reporter(leads, &at_base.factor).cause(base, None);
         for (change, &k) in watched.changes.iter_mut().zip(&at_base.causes[base.cause].columns) {
             change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);
         }

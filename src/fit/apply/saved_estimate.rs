@@ -285,6 +285,14 @@ impl SavedEstimate {
         self.strategy.model(declared)
     }
 
+    /// Returns the identified relative error of measured lengths; `None` if the problem declares no
+    /// `tracker-scale`.
+    #[doc(hidden)]
+    pub fn measurement_scale(&self) -> Option<f64> {
+        let is_scale = |entry: &&Entry| entry.name.starts_with("tracker-scale");
+        self.parameters.iter().find(is_scale).map(|entry| entry.estimate)
+    }
+
     /// Returns the days from the first pose of the identification to the first of these rows; `None`
     /// unless both have dates.
     #[doc(hidden)]
