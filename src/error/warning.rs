@@ -22,6 +22,12 @@ pub enum WarningKind {
         file.display()
     )]
     MapUnused { file: PathBuf },
+    #[error(
+        "these measurements are paired row by row with the joint table {}; if that is of other \
+         measurements, name theirs with --joints",
+        file.display()
+    )]
+    JointTableKept { file: PathBuf },
     #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
     Unmapped { names: Vec<String> },
     #[error(
