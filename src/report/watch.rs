@@ -142,6 +142,12 @@ fn verdict(watch: &Watch) -> String {
         (Some(cause), _) if cause.kind == CauseKind::Other => {
             "none of the causes that are tried explains the rows".to_owned()
         }
+        (Some(cause), _) if cause.kind == CauseKind::Misread => {
+            return format!(
+                "Not judged: the rows agree with the estimate if they are read in another way, with {}",
+                cause.label
+            );
+        }
         (Some(cause), _) => cause.label.clone(),
         (None, Some(cause)) => format!("not certain what; first {}", cause.label),
         (None, None) => String::new(),
