@@ -131,6 +131,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 common.problem_arguments(),
                 unused_folder(&arguments.estimate, "check")
             )
+        } else if watch.is_changed() && first == Some(CauseKind::Misread) {
+            format!(
+                "correct the table, then flexcal watch {} --estimate {file}",
+                common.problem_arguments()
+            )
         } else if watch.is_changed() && first == Some(CauseKind::Noise) {
             "measure a few of these poses again. If watch.html shows the evidence rise from some row on, give the rows from there on alone"
                 .to_owned()

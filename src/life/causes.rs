@@ -63,6 +63,8 @@ worded! {
         Noise = "noise";
         /// Gross error of one row.
         Row = "row";
+        /// Mistake in the table, with which the unchanged arm agrees: a unit, sign, order or column.
+        Misread = "misread";
         /// Large errors without a pattern, which none of these causes explains.
         Other = "other";
     }

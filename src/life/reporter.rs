@@ -46,6 +46,28 @@ pub struct WatchedCause {
     pub poses_to_tell_apart: Option<usize>,
 }
 
+impl WatchedCause {
+    /// Returns the cause that the table is misread if its rows, read in another way, have a smaller
+    /// error than with the most probable of `causes`; else these causes. `misread` describes the
+    /// other way, with its error.
+    pub(super) fn or_misread(causes: Vec<Self>, misread: Option<(String, f64)>) -> Vec<Self> {
+        let left = causes.first().and_then(|cause| cause.left_out_error).unwrap_or(f64::INFINITY);
+        let Some((label, error)) = misread.filter(|(_, error)| *error < left) else {
+            return causes;
+        };
+        vec![Self {
+            kind: CauseKind::Misread,
+            label,
+            row: None,
+            from_row: None,
+            probability: 1.0,
+            changes: Vec::new(),
+            left_out_error: Some(error),
+            poses_to_tell_apart: None,
+        }]
+    }
+}
+
 /// Change of one parameter since the estimate.
 #[derive(Debug, Clone)]
 pub struct Change {

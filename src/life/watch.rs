@@ -206,7 +206,8 @@ pub fn watch(
         let moved = tested.moved_fixture(at, (&earlier, &leads), threshold, linear);
         let base = || tested.moved_base(at, (&earlier, &leads), threshold, linear);
         let moved = moved.or_else(|| base().filter(|_| is_unexplained));
-        watched = moved.unwrap_or(watched);
+        let misread = fit::misread_table(problem, (&model, &x), &kept);
+        watched = WatchedCause::or_misread(moved.unwrap_or(watched), misread);
     }
     state_turns(&model, &x, &mut watched);
     Ok(Watch {

@@ -171,6 +171,12 @@ fn verdict(watch: &Watch) -> String {
                 counted(row, "row")
             );
         }
+        (Some(cause), _) if cause.kind == CauseKind::Misread => {
+            return format!(
+                "Not judged: the rows agree with the estimate if they are read in another way, with {}",
+                cause.label
+            );
+        }
         (Some(cause), _) => cause.label.clone(),
         (None, Some(cause)) => format!("not certain what; first {}", cause.label),
         (None, None) => String::new(),

@@ -409,6 +409,15 @@ impl SavedEstimate {
         &self.problem
     }
 
+    /// Returns the numbers of declared joints of this estimate and of `other` if they differ; `None`
+    /// if they are equal or not known.
+    pub(crate) fn joint_counts(&self, other: &Self) -> Option<[usize; 2]> {
+        let [one, two] = [self, other].map(|estimate| {
+            estimate.arm_parts.keys().filter(|part| part.starts_with("joint ")).count()
+        });
+        (one != two && one.min(two) > 0).then_some([one, two])
+    }
+
     /// Returns the first part of the declared arm in which this estimate and `other` differ; `None`
     /// if both are of the same declared arm.
     pub(crate) fn differing_part(&self, other: &Self) -> Option<DifferingPart> {
