@@ -243,7 +243,10 @@ fn next_step(
     let flags = asked.flags();
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
-    let lacks = if next.has_large_misfit() && !noise_exceeds {
+    // The new rows of an update are too few for a search.
+    let lacks = if asked.prior.is_some() {
+        String::new()
+    } else if next.has_large_misfit() && !noise_exceeds {
         let closed = results.path("problem.closed.toml");
         if Problem::read(&closed).is_ok_and(|closed| closed.name == problem.name) {
             return format!(

@@ -11,7 +11,7 @@ use super::assessment::{Assessment, assess};
 use super::causes::{Cause, CauseKind, Extended};
 use super::contradiction::{Contradiction, most_probable};
 use super::drift;
-use super::earlier::Earlier;
+use super::earlier::{Earlier, WIDE_SIGMA};
 use super::error::PriorError;
 use super::evidence::factor;
 use super::fleet_file::FleetPrior;
@@ -44,9 +44,6 @@ const MIN_LEARNED: f64 = 1e-3;
 /// Distance of a bound from the mean of the prior, in standard deviations of the prior, beyond
 /// which an estimate at the bound contradicts the prior.
 const BOUND_SIGMAS: f64 = 3.0;
-/// Standard deviation (1 σ) assumed for the deviation of a parameter without any prior: \[m\],
-/// \[rad\], or of a logarithm.
-pub(super) const WIDE_SIGMA: f64 = 1.0;
 
 /// Source of the prior of an identification.
 #[derive(Debug, Clone)]

@@ -109,11 +109,11 @@ impl JoinedLog {
         let dialect = &problem.data.dialect;
         let mut joined = Self { rule: log.by, location: log.location.clone(), ..Self::default() };
         for file in &log.files {
-            let missing = || match log.is_given {
-                true => Location::file(file).error(InputErrorKind::GivenFileMissing),
-                false => {
-                    let kind = InputErrorKind::DataFileMissing { path: file.clone() };
-                    log.location.clone().error(kind)
+            let missing = || {
+                let kind = InputErrorKind::DataFileMissing { path: file.clone() };
+                match log.is_given {
+                    true => Location::file(file).error(InputErrorKind::GivenFileMissing),
+                    false => log.location.clone().error(kind),
                 }
             };
             joined.read_file(Table::open(file, dialect, missing)?, dialect)?;

@@ -285,12 +285,11 @@ impl SavedEstimate {
         self.strategy.model(declared)
     }
 
-    /// Returns the identified relative error of measured lengths; `None` if the problem declares no
-    /// `tracker-scale`.
+    /// Returns the relative error of measured lengths, if the problem declares one.
     #[doc(hidden)]
     pub fn measurement_scale(&self) -> Option<f64> {
-        let is_scale = |entry: &&Entry| entry.name.starts_with("tracker-scale");
-        self.parameters.iter().find(is_scale).map(|entry| entry.estimate)
+        let scale = self.parameters.iter().find(|of| of.name.starts_with("tracker-scale"));
+        scale.map(|entry| entry.estimate)
     }
 
     /// Sets the elapsed times of `poses` to those since the start of their session in the
