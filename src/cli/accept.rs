@@ -128,6 +128,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             )
         } else if verdict == Some(Verdict::Undecided.as_str()) {
             "measure and hold out more poses, then the same command again".to_owned()
+        } else if found.cautions().next().is_some() {
+            format!("read the warnings in {}, then print and sign it", page.display())
         } else {
             format!("print {} and sign it", page.display())
         };
