@@ -103,7 +103,8 @@ impl Fitted {
 
     /// Judges the held-out rows of `found`, the identification that was corrected, with the
     /// remainder if one is kept.
-    pub(crate) fn judge_held_out(&self, found: &mut Identification) {
+    #[doc(hidden)]
+    pub fn judge_held_out(&self, found: &mut Identification) {
         if let Some(corrected) = &self.residuals {
             let errors: Vec<_> = corrected.rows.iter().map(|row| row.position).collect();
             found.judge_corrected(&errors);
