@@ -263,7 +263,7 @@ fn next_step(
         String::new()
     };
     if next.poses.is_empty() {
-        let prior: String = asked.prior_words().iter().map(|word| format!(" {word}")).collect();
+        let prior = asked.prior_words().iter().fold(String::new(), |all, word| all + " " + word);
         return format!("{lacks}flexcal identify {arguments}{prior} writes the estimate to apply");
     }
     let file = shell_word(common.problem());
@@ -294,7 +294,7 @@ fn next_step(
         [_, ..] => {
             let at_hand: Vec<&PathBuf> = files.iter().collect();
             let others = columns_at_hand(&at_hand, (problem, &next.poses), false);
-            let others: String = others.iter().map(|name| format!(", {name}")).collect();
+            let others = others.iter().fold(String::new(), |all, name| all + ", " + name);
             format!("measure {these}, add the columns x_mm, y_mm, z_mm{others}, then")
         }
         [] => format!("measure {these}, add the columns x_mm, y_mm, z_mm, then"),
