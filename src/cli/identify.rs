@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .with_solver(arguments.solver)
         .with_influential_rows()
         .with_stop(stop.clone());
-    let (sources, updated, identification) =
+    let (sources, updated, mut identification) =
         Line::during(common.prints_text(), stop, |sink| -> Result<_, PriorError> {
             let options = options.with_progress(sink);
             if let Some(prior) = &prior {
@@ -163,6 +163,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
         (fitted, _) => fitted,
     };
+    if let Some(fitted) = &fitted {
+        fitted.judge_held_out(&mut identification);
+    }
     let mut result =
         IdentificationResult::new(&problem, &identification).with_files(common.files(&problem));
     if let Some(fitted) = &fitted {

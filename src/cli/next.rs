@@ -240,10 +240,15 @@ fn next_step(
 ) -> String {
     let common = &asked.common;
     let arguments = common.problem_arguments();
+    if !next.found.is_trusted() {
+        return format!("flexcal identify {arguments} says why the fit is not to be trusted");
+    }
     let flags = asked.flags();
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
-    let lacks = if next.has_large_misfit() && !noise_exceeds {
+    let lacks = if asked.purpose == Purpose::Causes {
+        String::new()
+    } else if next.has_large_misfit() && !noise_exceeds {
         let closed = results.path("problem.closed.toml");
         if Problem::read(&closed).is_ok_and(|closed| closed.name == problem.name) {
             return format!(
@@ -256,7 +261,7 @@ fn next_step(
         format!(
             "flexcal loop {arguments} looks for what the model lacks, because the misfit exceeds the noise; or "
         )
-    } else if next.found.is_trusted() && next.is_out_of_reach(tolerance) && !next.poses.is_empty() {
+    } else if next.is_out_of_reach(tolerance) && !next.poses.is_empty() {
         "choose another --tolerance-mm or a better instrument; to lower the error all the same, "
             .to_owned()
     } else {
@@ -300,8 +305,13 @@ fn next_step(
         [] => format!("measure {these}, add the columns x_mm, y_mm, z_mm, then"),
     };
     let measured: Vec<String> = files.iter().map(|file| shell_word(file)).collect();
+    let command = if asked.purpose == Purpose::Causes {
+        format!("loop {file}")
+    } else {
+        format!("next {file}{flags}")
+    };
     format!(
-        "{lacks}{measure} flexcal next {file}{flags} --data {} {}",
+        "{lacks}{measure} flexcal {command} --data {} {}",
         measured.join(" "),
         shell_word(&results.path("next.csv")),
     )
