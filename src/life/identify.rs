@@ -9,7 +9,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::assessment::{Assessment, assess};
 use super::causes::{Cause, CauseKind, Extended};
-use super::contradiction::{Contradiction, most_probable};
+use super::contradiction::{self, Contradiction, most_probable};
 use super::drift;
 use super::earlier::{Earlier, WIDE_SIGMA};
 use super::error::PriorError;
@@ -148,12 +148,15 @@ pub(super) fn identified(
         let cause = cause.filter(|_| is_new_cause && causes.len() < MAX_CAUSES);
         let Some(cause) = cause else {
             causes.extend(contradicting_bound(&model, &found, &original));
-            let findings = causes.iter().enumerate();
-            found.findings.extend(findings.map(|(k, cause)| cause.finding(k, source.file())));
+            let has_raised_sigma = causes.iter().any(|cause| cause.noise_ratio.is_some());
+            if has_raised_sigma {
+                let chi2 = chi2.map(|(chi2, coordinates, _)| (chi2, coordinates));
+                contradiction::attribute_to_prior(&mut found.findings, source.file(), chi2);
+            }
+            found.findings.extend(contradiction::findings(&causes, source.file()));
             found.fitted_rows.extend(original.fitted_rows.iter().cloned());
             found.fitted_rows.sort();
             found.fitted_rows.dedup();
-            let has_raised_sigma = causes.iter().any(|cause| cause.noise_ratio.is_some());
             let labels = causes.into_iter().map(|cause| cause.label).collect();
             found.prior = Some(PriorComparison {
                 days,
@@ -322,15 +325,18 @@ fn contradicting_evidence(assessed: &Assessment) -> Option<f64> {
     (evidence > CONTRADICTION_RATIO.ln()).then_some(evidence.max(assessed.ln_sum))
 }
 
-/// Returns the assessment with pairs of causes if the rows contradict the earlier estimate, and
-/// unchanged otherwise; `None` if a number is not finite.
+/// Returns the assessment with pairs of causes if the rows contradict the earlier estimate and no
+/// single change of the arm is the most probable cause, and unchanged otherwise: a single change is
+/// fitted first, and the rows are tested again. `None` if a number is not finite.
 fn paired(
     assessed: Assessment,
     rows: &SensitiveRows,
     factor: &DMatrix<f64>,
     causes: &mut Vec<Cause>,
 ) -> Option<Assessment> {
-    if contradicting_evidence(&assessed).is_none() {
+    let first = assessed.causes.first().map(|first| &causes[first.cause]);
+    let is_of_arm = first.is_some_and(|cause| !cause.columns.is_empty());
+    if is_of_arm || contradicting_evidence(&assessed).is_none() {
         return Some(assessed);
     }
     with_pairs(assessed, rows, factor, causes)

@@ -12,7 +12,7 @@ use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
 use super::spelling::{quoted, same_but_for_spelling};
 use super::table::{Table, shortened};
 use super::time::shown;
-use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
+use crate::error::{InputError, Location, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Dialect, JoinRule, JointLog, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::two_digits;
@@ -109,14 +109,7 @@ impl JoinedLog {
         let dialect = &problem.data.dialect;
         let mut joined = Self { rule: log.by, location: log.location.clone(), ..Self::default() };
         for file in &log.files {
-            let missing = || {
-                let kind = InputErrorKind::DataFileMissing { path: file.clone() };
-                match log.is_given {
-                    true => Location::file(file).error(InputErrorKind::GivenFileMissing),
-                    false => log.location.clone().error(kind),
-                }
-            };
-            joined.read_file(Table::open(file, dialect, missing)?, dialect)?;
+            joined.read_file(Table::open(file, dialect, || log.missing(file))?, dialect)?;
         }
         let mut by_time: Vec<usize> = (0..joined.rows.len()).collect();
         let time = |row: &usize| joined.rows.get(*row).map_or(f64::NAN, |row| row.time);
@@ -310,13 +303,14 @@ impl JoinedLog {
             self.log_times.iter().zip(self.log_times.iter().skip(1)).map(|(a, b)| b - a).collect();
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2)?;
+        let gap = *gaps.get(gaps.len() / 2)?;
         let digit = 10_f64.powf((2.0 * most).log10().floor());
         let tolerance = (2.0 * most / digit).ceil() * digit;
         (gaps.len() >= MIN_CHECKED_ROWS && 10.0 * most < step).then(|| {
             TableErrorKind::ToleranceTooSmall {
                 left: self.unpaired.len(),
                 rows: self.requested,
-                gap: format!("{} s", two_digits(gaps[gaps.len() / 2], 3)),
+                gap: format!("{} s", two_digits(gap, 3)),
                 step: format!("{} s", two_digits(step, 3)),
                 tolerance: two_digits(tolerance, 6),
             }

@@ -294,18 +294,6 @@ impl fmt::Display for Misreading {
                 write!(f, "positions that belong to the configuration {} {rows} {side}", by.abs())?;
                 if from > 0 { write!(f, ", from row {} of the table on", from + 1) } else { Ok(()) }
             }
-            Self::ExchangedAxes => f.write_str("columns u and v that are exchanged"),
-            Self::FromBottom => {
-                f.write_str("a column v that counts from the bottom of the image (write height − v)")
-            }
-            Self::Transposed => f.write_str(
-                "points of the marker that are numbered along the other side (its rows and columns exchanged)",
-            ),
-            Self::ShiftedViews { by } => {
-                let (views, side) = (by.unsigned_abs(), if by > 0 { "before" } else { "after" });
-                let plural = if views == 1 { "" } else { "s" };
-                write!(f, "images that belong to the configuration {views} view{plural} {side}")
-            }
             Self::Zero { joint, degrees } => {
                 write!(f, "joint {joint} whose zero position is {degrees}° off")
             }
@@ -319,9 +307,21 @@ impl fmt::Display for Misreading {
 }
 
 impl Misreading {
-    /// Writes the description of a misreading of loads, targets, cameras or the joint table.
+    /// Writes the description of a misreading of images, loads, targets or the joint table.
     fn fmt_of_loads(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::ExchangedAxes => f.write_str("columns u and v that are exchanged"),
+            Self::FromBottom => {
+                f.write_str("a column v that counts from the bottom of the image (write height − v)")
+            }
+            Self::Transposed => f.write_str(
+                "points of the marker that are numbered along the other side (its rows and columns exchanged)",
+            ),
+            Self::ShiftedViews { by } => {
+                let (views, side) = (by.unsigned_abs(), if by > 0 { "before" } else { "after" });
+                let plural = if views == 1 { "" } else { "s" };
+                write!(f, "images that belong to the configuration {views} view{plural} {side}")
+            }
             Self::Mass { mass: 0, scale } => write!(f, "masses that are {scale}"),
             Self::Mass { mass, scale } => {
                 write!(f, "mass {mass}, counted along the arm, that is {scale}")
