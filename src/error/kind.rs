@@ -415,6 +415,12 @@ pub enum InputErrorKind {
     )]
     NoEquilibrium,
     #[error(
+        "the identified arm has no equilibrium under the loads of this row{}; check the columns of \
+         loads (payload_kg, hoist_N) and their units",
+        if *others == 0 { String::new() } else { format!(" and of {others} more") }
+    )]
+    LoadsTooLarge { others: usize },
+    #[error(
         "the nominal arm has no equilibrium under its loads here; {joint} may be too soft: gravity \
          on the masses beyond it has a moment of up to {moment} N·m, which could turn it by up to {angle} \
          rad; {}",
