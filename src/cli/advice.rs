@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexcal::fit::{FindingCode, Identification, SavedEstimate, Strategy};
-use flexcal::problem::{Fixture, PoseRanges, Problem};
+use flexcal::problem::{Fixture, HeldOut, PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
 use flexcal::select::Verdict;
@@ -12,8 +12,14 @@ use super::input::Common;
 use super::output::Results;
 use super::plan;
 
-/// Number of poses that a suggested plan has to distinguish two effects.
-const SEPARATING_POSES: usize = 12;
+/// Smallest number of poses that a suggested plan has to distinguish two effects.
+const MIN_SEPARATING_POSES: usize = 12;
+/// Largest number of these poses, as a multiple of the measured ones.
+const MAX_SEPARATING_RATIO: f64 = 3.0;
+/// Odds of an effect against its rival at which the cause counts as certain.
+const CERTAIN_ODDS: f64 = 19.0;
+/// Smallest number of new poses of which some may be held out without a warning.
+const MANY_POSES: usize = 20;
 
 /// Findings that indicate a mistake in the table or the problem, not an effect that the model
 /// lacks.
@@ -172,15 +178,28 @@ pub fn after_loop(
     let doubted = result.effects.iter().filter(|found| found.is_doubted());
     let mut pairs = doubted.filter_map(|found| {
         let rival = found.alternatives.first()?;
-        Some([found.effect.declaration.clone(), rival.effect.declaration.clone()])
+        let pair = [found.effect.declaration.clone(), rival.effect.declaration.clone()];
+        let law = found.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
+        Some((pair, separating_poses(law / rival.probability, fit.fitted.identification.n)))
     });
-    let can_be_planned = |pair: &[String; 2]| {
+    let can_be_planned = |(pair, _): &([String; 2], String)| {
         PoseRanges::of(problem).is_ok() && plan::effect_pair(pair, problem).is_ok()
     };
     let closed = shell_word(&results.path("problem.closed.toml"));
-    if let Some([effect, rival]) = pairs.find(can_be_planned) {
+    if let Some(([effect, rival], poses)) = pairs.find(can_be_planned) {
+        // The plan counts measured poses only if their files are named.
+        let measured: Vec<String> = match common.data() {
+            [] => problem.data.files.iter().map(|file| shell_word(file)).collect(),
+            _ => Vec::new(),
+        };
+        let data = if measured.is_empty() {
+            String::new()
+        } else {
+            format!(" --data {}", measured.join(" "))
+        };
         let plan = format!(
-            "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{effect}' '{rival}' chooses poses that tell the two apart"
+            "flexcal plan {named}{data} --poses {poses} --separate '{effect}' '{rival}' chooses about as many further poses as it takes to \
+             tell the two apart"
         );
         return format!(
             "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {plan}"
@@ -208,6 +227,16 @@ pub fn after_loop(
             )
         }
     }
+}
+
+/// Returns the number of further poses after which an effect is expected to have [`CERTAIN_ODDS`]
+/// against its rival, if its odds are `odds` after `measured` poses. The logarithm of the odds grows
+/// in proportion to the poses.
+fn separating_poses(odds: f64, measured: usize) -> String {
+    let wanted = measured as f64 * (CERTAIN_ODDS.ln() / odds.max(1.0).ln() - 1.0);
+    let least = MIN_SEPARATING_POSES as f64;
+    let most = (MAX_SEPARATING_RATIO * measured as f64).max(least);
+    format!("{:.0}", wanted.clamp(least, most).ceil())
 }
 
 /// Returns what to do after an estimate was applied to rows that do not contradict it. `path` is the
@@ -260,6 +289,17 @@ pub fn fitted_arguments(common: &Common, problem: &Problem, estimate: &SavedEsti
     }
     let files: Vec<String> = files.iter().map(|file| shell_word(file)).collect();
     format!("{named} --data {}", files.join(" "))
+}
+
+/// Formats the argument of `identify` that fits all of a few new poses, beginning with a space;
+/// empty if the problem holds no fraction of them out, or if there are many. `poses` holds the
+/// number of each row's pose, from 0.
+pub fn held_out_argument(held_out: Option<&HeldOut>, poses: &[usize]) -> &'static str {
+    let are_few = poses.iter().all(|&pose| pose + 1 < MANY_POSES);
+    match held_out {
+        Some(HeldOut::Fraction { .. }) if are_few => " --held-out none",
+        _ => "",
+    }
 }
 
 /// Formats the strategy of an estimate as an argument of `identify`, beginning with a space; empty

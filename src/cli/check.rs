@@ -53,15 +53,19 @@ enum PosesError {
 /// prints the forecast.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let problem = Problem::read(common.problem())?;
+    let problem = common.read_problem()?;
     let results = common.results(
         "check",
         &problem,
         &arguments.source.files(),
         &["check.json", "check.html"],
     )?;
-    let check =
-        design::check(&problem, &checked_poses(arguments, &problem)?, arguments.source.seed)?;
+    let poses = checked_poses(arguments, &problem)?;
+    let turns = match &poses {
+        CheckedPoses::Table { poses, .. } => Common::orientation_line(&problem, poses),
+        CheckedPoses::Drawn(..) => "",
+    };
+    let check = design::check(&problem, &poses, arguments.source.seed)?;
     let json = CheckResult::new(&problem, &check).to_json();
     let story = report::check(&problem, &check);
     results.write(&[("check.json", &json), ("check.html", &story.page())])?;
@@ -75,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             format!("flexcal plan {problem_word} --poses N chooses poses that tell more")
         };
-        format!("{}{}Next: {next}\n", story.text(), results.written())
+        format!("{}{turns}{}Next: {next}\n", story.text(), results.written())
     })?;
     if check.suffices() {
         return Ok(Outcome::Done);

@@ -7,7 +7,6 @@ use clap::Args;
 use flexcal::error::{InputError, InputErrorKind, TableErrorKind};
 use flexcal::fit;
 use flexcal::measurement::Measurements;
-use flexcal::problem::Problem;
 use flexcal::remainder::{self, Compensation, TargetFrame};
 use flexcal::report::{self, Doubts, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
@@ -79,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if common.data().is_empty() {
         return Err(NoTargets.into());
     }
-    let mut problem = Problem::read(common.problem())?;
+    let mut problem = common.read_problem()?;
     // Every row is a target, so none is held out.
     problem.data.held_out = None;
     let results = common.results(
@@ -120,6 +119,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // An error of the remainder's file is reported only after errors of the estimate, which explain
     // more.
     correction?;
+    common.hint(estimate.measurement_scale().map(|scale| {
+        format!(
+            "targets are true positions: the problem says that the measurement reads them {:.3} mm per metre too far apart (tracker-scale); \
+             if the arm errs instead, so do the commands",
+            1e3 * scale
+        )
+    }));
     if found.is_base_open {
         common.hint([
             "the estimate does not know where the arm's base is in the measuring frame, so targets in that frame are reached as far as it \

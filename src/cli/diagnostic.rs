@@ -2,14 +2,15 @@
 
 use std::error::Error;
 use std::io::{IsTerminal as _, Write as _};
+use std::path::PathBuf;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
 use flexcal::error::{
-    InputError, InputErrorKind, Location, TableErrorKind, mask_hidden, message_with_causes,
-    mistake, one_line,
+    InputError, InputErrorKind, Location, TableErrorKind, file_like, mask_hidden,
+    message_with_causes, mistake, one_line,
 };
-use flexcal::fit::{Finding, FindingCode, Identification};
+use flexcal::fit::{Finding, FindingCode, Identification, SavedEstimateError};
 use flexcal::report;
 
 use super::outcome::Outcome;
@@ -22,11 +23,25 @@ pub fn print(error: &(dyn Error + 'static)) {
     let mistake = mistake(error);
     let with_arguments =
         error.downcast_ref().and_then(by_arguments).or(mistake.and_then(with_argument));
-    show(
-        Level::ERROR,
-        &with_arguments.unwrap_or_else(|| message_with_causes(error)),
-        mistake.map(|input| &*input.location),
-    );
+    let message = with_arguments.unwrap_or_else(|| message_with_causes(error));
+    let message = match file_like_missing(error, mistake) {
+        Some(file) => format!("{message}; there is {}", file.display()),
+        None => message,
+    };
+    show(Level::ERROR, &message, mistake.map(|input| &*input.location));
+}
+
+/// Returns the path of a file with a name like that of the file that an error says is missing.
+fn file_like_missing(
+    error: &(dyn Error + 'static),
+    mistake: Option<&InputError>,
+) -> Option<PathBuf> {
+    let missing = match (mistake.map(|input| &*input.kind), error.downcast_ref()) {
+        (Some(InputErrorKind::DataFileMissing { path }), _)
+        | (_, Some(SavedEstimateError::NoSuchFile { file: path })) => path,
+        _ => &mistake.filter(|input| input.location.line.is_none())?.location.file,
+    };
+    file_like(missing)
 }
 
 /// Returns the message of an error in the input with the argument that would avoid it; `None` if no

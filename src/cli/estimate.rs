@@ -1,10 +1,12 @@
 //! Argument of the commands that apply an estimate, and the function that reads the estimate.
 
+use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::files::{Changes, was_changed};
 use flexcal::fit::{SavedEstimate, SavedEstimateError};
+use flexcal::life::{FleetPrior, PriorError, PriorSource};
 
 use super::diagnostic;
 
@@ -27,6 +29,19 @@ impl Trust {
             warn_of_change(&format!("{}: {key}", file.display()));
         }
         Ok(estimate)
+    }
+
+    /// Reads the prior of an identification: a PRIOR.toml, or an estimate. Returns an error also if
+    /// the fit of the estimate was not trusted.
+    pub fn read_prior(self, file: &Path) -> Result<PriorSource, Box<dyn Error>> {
+        if file.extension().is_some_and(|ending| ending == "toml") {
+            return Ok(PriorSource::Fleet(FleetPrior::read(file)?));
+        }
+        let estimate = self.read(file)?;
+        if !estimate.trusted {
+            return Err(PriorError::Untrusted { file: file.to_owned() }.into());
+        }
+        Ok(PriorSource::Estimate(Box::new(estimate)))
     }
 
     /// Returns an error if a table beside an estimate was changed since flexcal wrote it, unless

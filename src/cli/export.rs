@@ -209,7 +209,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     flags.hint(absent.map(|absent| {
         format!("no errors are computed, because {} does not exist", absent.display())
     }));
-    let errors = match &data {
+    let judged = data.as_ref().filter(|data| geometry.can_be_judged(data));
+    flags.hint((data.is_some() && judged.is_none()).then_some(
+        "no errors are computed, because the measurements do not judge the geometry of --best-rigid: some rows measure no position",
+    ));
+    let errors = match judged {
         Some(data) => {
             // Bases and targets are those that occur in the data, perhaps fewer than in the fit.
             let placement = Placement::of(&data.measurements);

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{ArgAction, Args};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
-use flexcal::life::{FleetPrior, PriorError, PriorSource, Update, update};
+use flexcal::life::{PriorError, Update, update};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
@@ -16,14 +16,11 @@ use flexcal::results::{
 };
 
 use super::estimate::Trust;
-use super::input::{Common, Input};
+use super::input::Common;
 use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
 use super::{advice, diagnostic, interrupt, values};
-
-/// Smallest number of new poses of which some may be held out without a warning.
-const MANY_POSES: usize = 20;
 
 /// Arguments of `flexcal identify`.
 #[derive(Debug, Args)]
@@ -51,12 +48,25 @@ pub struct Arguments {
     /// Days since the earlier identification, by whose drift the prior is widened
     #[arg(long, value_name = "DAYS", default_value_t = 0.0, requires = "prior", value_parser = values::days)]
     drift: f64,
+    /// Rows to hold out: those that the problem says, or none
+    #[arg(long, value_name = "ROWS", default_value = HELD_OUT[0].0, action = ArgAction::Set, value_parser = values::one_of(HELD_OUT))]
+    held_out: bool,
     #[command(flatten)]
     trust: Trust,
     /// Print every table: parameters, outliers, what the poses can tell
     #[arg(short, long, conflicts_with_all = ["quiet", "json"])]
     verbose: bool,
 }
+
+/// Values of `--held-out`, each with a summary, and true if the problem is followed.
+const HELD_OUT: [(&str, &str, bool); 2] = [
+    ("declared", "As held_out in [data] of the problem says", true),
+    (
+        "none",
+        "Every row is fitted; each configuration is also predicted by a fit without it",
+        false,
+    ),
+];
 
 /// Returns the solvers with their names and summaries.
 fn solvers() -> Vec<(&'static str, &'static str, SolverChoice)> {
@@ -65,16 +75,14 @@ fn solvers() -> Vec<(&'static str, &'static str, SolverChoice)> {
 
 /// Prints a warning if few new rows are fitted with a prior and some of them are held out.
 fn warn_of_held_out(problem: &Problem, data: &Dataset) {
-    let Some(HeldOut::Fraction { .. }) = problem.data.held_out else { return };
     let poses = data.measurements.pose_numbers(problem);
-    let count = |rows: &[usize]| {
-        rows.iter().filter_map(|&row| poses.get(row)).collect::<BTreeSet<_>>().len()
-    };
-    let held_out = count(&data.split.held_out);
-    let all = held_out + count(&data.split.identification);
-    if held_out > 0 && all < MANY_POSES {
+    let held_out: BTreeSet<usize> = data.split.held_out.iter().map(|&row| poses[row]).collect();
+    let argument = advice::held_out_argument(problem.data.held_out.as_ref(), &poses);
+    if !held_out.is_empty() && !argument.is_empty() {
+        let all = poses.into_iter().collect::<BTreeSet<_>>().len();
         diagnostic::warn(&format!(
-            "{held_out} of the {all} new poses are held out and not fitted; held_out = \"none\" in [data] fits all"
+            "{} of the {all} new poses are held out and not fitted;{argument} fits all",
+            held_out.len()
         ));
     }
 }
@@ -100,24 +108,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if arguments.remainder || arguments.prior.is_some() {
         names.push(REMAINDER_FILE);
     }
-    let Input { problem, data, results } =
-        common.read_beside("identify", arguments.prior.as_slice(), &names)?;
+    let mut problem = common.read_problem()?;
+    if !arguments.held_out {
+        problem.data.held_out = Some(HeldOut::Nothing);
+    }
+    let results = common.results("identify", &problem, arguments.prior.as_slice(), &names)?;
+    let data = common.measurements(&problem)?;
     if arguments.prior.is_some() && !common.quiet {
         warn_of_held_out(&problem, &data);
     }
-    let prior = match arguments.prior.as_deref() {
-        Some(file) if file.extension().is_some_and(|ending| ending == "toml") => {
-            Some(PriorSource::Fleet(FleetPrior::read(file)?))
-        }
-        Some(file) => {
-            let estimate = arguments.trust.read(file)?;
-            if !estimate.trusted {
-                return Err(PriorError::Untrusted { file: file.to_owned() }.into());
-            }
-            Some(PriorSource::Estimate(Box::new(estimate)))
-        }
-        None => None,
-    };
+    let prior =
+        arguments.prior.as_deref().map(|file| arguments.trust.read_prior(file)).transpose()?;
     let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);
     common.warn_if_nothing_is_free(&problem);
     let stop = interrupt::stop();
@@ -204,7 +205,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let is_structured = shown.residual_tests.is_structured();
         let estimate = results.path("estimate.json");
         let next = advice::after_fit(common, (&problem, &identification), is_structured, &estimate);
-        format!("{told}{words}{sources}{}Next: {next}\n", results.written())
+        let turns = Common::orientation_line(&problem, &data.measurements);
+        format!("{told}{turns}{words}{sources}{}Next: {next}\n", results.written())
     })?;
     if let (Some(words), true, false) = (&sources, common.json, common.quiet) {
         diagnostic::warn(words);

@@ -8,6 +8,7 @@ use flexcal::report;
 use flexcal::results::{Document as _, InitResult};
 use flexcal::urdf::{Chain, Robot, describe_measured};
 
+use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
 
@@ -41,6 +42,9 @@ pub struct Arguments {
 /// Numbers of inner corners along and across a calibration board, and their distance \[mm\].
 type Board = ([usize; 2], f64);
 
+/// Usual distances of the corners of a calibration board \[mm\].
+const USUAL_SQUARES_MM: std::ops::RangeInclusive<f64> = 0.5..=500.0;
+
 /// Parses the size of a calibration board such as `9x6x25`.
 fn parse_board(text: &str) -> Result<Board, String> {
     let parts: Vec<&str> = text.split(['x', '×']).collect();
@@ -58,6 +62,12 @@ fn parse_board(text: &str) -> Result<Board, String> {
 
 /// Writes the chain of a URDF between two links as `problem.toml`.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    if let Some((_, mm)) = arguments.board.filter(|board| !USUAL_SQUARES_MM.contains(&board.1)) {
+        diagnostic::warn(&format!(
+            "--board: corners that are {mm} mm apart? The third number is in mm, such as 25 for \
+             squares of 0.025 m"
+        ));
+    }
     let robot = Robot::read(&arguments.urdf)?;
     let chain = Chain::new(&robot, arguments.base.as_deref(), arguments.tip.as_deref())?;
     let description = describe_measured(&chain, arguments.board)?;

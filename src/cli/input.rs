@@ -5,7 +5,7 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::error::{InputError, Warning, WarningKind};
+use flexcal::error::{InputError, InputErrorKind, TableErrorKind, Warning, WarningKind};
 use flexcal::fit::{self, SavedEstimate};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{Freedom, ParameterRule, Problem};
@@ -24,8 +24,21 @@ pub struct Common {
     /// Measurement files instead of those the problem names
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
+    /// Joint tables instead of those that `joints` in [data] names
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    joints: Vec<PathBuf>,
     #[command(flatten)]
     pub flags: Flags,
+}
+
+/// Error that joint tables are given for a problem that does not join any.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "--joints: {} joins no joint table; write joints = {{ files = [\"controller.csv\"], by = \"time\" }} in [data]",
+    file.display()
+)]
+struct NothingToJoin {
+    file: PathBuf,
 }
 
 /// Gives access to the flags of every command.
@@ -74,7 +87,54 @@ impl Common {
     pub fn data_arguments(&self) -> String {
         let data: Vec<String> =
             self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
-        if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) }
+        let data =
+            if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
+        let joints: Vec<String> =
+            self.joints.iter().map(|file| format!(" {}", shell_word(file))).collect();
+        if joints.is_empty() { data } else { format!("{data} --joints{}", joints.concat()) }
+    }
+
+    /// Reads the problem, with the joint tables of `--joints` instead of its own.
+    pub fn read_problem(&self) -> Result<Problem, Box<dyn Error>> {
+        let mut problem = Problem::read(self.problem())?;
+        if !self.joints.is_empty() {
+            let log = problem.data.joint_log.as_mut();
+            let log = log.ok_or_else(|| NothingToJoin { file: self.problem_file() })?;
+            (log.files, log.is_given) = (self.joints.clone(), true);
+        }
+        Ok(problem)
+    }
+
+    /// Reads the measurement files with `read` and prints the warnings. If they cannot be read
+    /// beside a joint table of other measurements, a warning names that table.
+    pub fn read_rows(
+        &self,
+        problem: &Problem,
+        read: impl Fn(&[PathBuf], &Problem) -> Result<(Measurements, Vec<Warning>), InputError>,
+    ) -> Result<(Measurements, Vec<Warning>), InputError> {
+        let rows = read(self.files(problem), problem);
+        let kept = problem.data.joint_log.as_ref().filter(|log| !log.is_given);
+        let is_of_pairs = |error: &InputError| {
+            matches!(
+                &*error.kind,
+                InputErrorKind::Table(
+                    TableErrorKind::NothingJoined { .. }
+                        | TableErrorKind::MostUnpaired { .. }
+                        | TableErrorKind::CommonPartner { .. }
+                        | TableErrorKind::ManyRowsToPair { .. }
+                )
+            )
+        };
+        let are_others = !self.data().is_empty() && rows.as_ref().is_err_and(is_of_pairs);
+        if let Some(log) = kept.filter(|_| are_others) {
+            self.hint(log.files.first().map(|file| {
+                format!(
+                    "the joint table is still {}, which joints in [data] names; --joints FILE gives that of these measurements",
+                    file.display()
+                )
+            }));
+        }
+        rows
     }
 
     /// Returns the measurement files named by `--data`; empty if those of the problem are used.
@@ -96,7 +156,7 @@ impl Common {
         others: &[PathBuf],
         names: &[&str],
     ) -> Result<Input, Box<dyn Error>> {
-        let problem = Problem::read(self.problem())?;
+        let problem = self.read_problem()?;
         let results = self.results(command, &problem, others, names)?;
         let data = self.measurements(&problem)?;
         Ok(Input { problem, data, results })
@@ -105,7 +165,7 @@ impl Common {
     /// Reads the measurements of a problem, prints warnings, and splits the rows into
     /// identification and held-out rows.
     pub fn measurements(&self, problem: &Problem) -> Result<Dataset, InputError> {
-        let (mut measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
+        let (mut measurements, mut warnings) = self.read_rows(problem, Measurements::read)?;
         warnings.extend(measurements.row_warnings(problem));
         self.warn(&warnings);
         // Reports list the warnings of the measurements.
@@ -134,6 +194,16 @@ impl Common {
                  \"joint*.alpha\" = {{ sigma_deg = 1.0 }}, \"joint*.a\" = {{ sigma_mm = 5.0 }}, \"joint*.theta\" = {{ sigma_deg = 1.0 }}, \
                  \"joint*.d\" = {{ sigma_mm = 5.0 }}, \"base.*\" = {{ free = true }}"
             ));
+        }
+    }
+
+    /// Returns a line of text that says that the orientations of a table are not fitted; empty if
+    /// they are, or if it has none.
+    pub fn orientation_line(problem: &Problem, rows: &Measurements) -> &'static str {
+        if rows.orientations.is_some() && !problem.data.fits_orientation {
+            "\nThe orientations in the table are not fitted: orientation_sigma_deg in [data], their 1 σ, fits them.\n"
+        } else {
+            ""
         }
     }
 

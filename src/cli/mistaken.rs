@@ -8,7 +8,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use flexcal::report::shell_word;
 
 /// Words that are often given as options or values but are neither, with the tip for them.
-const MISTAKEN_WORDS: [(&[&str], &str); 6] = [
+const MISTAKEN_WORDS: [(&[&str], &str); 17] = [
     (
         &["--output", "--ouput", "--outdir", "--out-dir", "--output-dir", "-o"],
         "--out DIR names the folder of the results",
@@ -17,7 +17,45 @@ const MISTAKEN_WORDS: [(&[&str], &str); 6] = [
         &["--heldout", "--held-out", "--held_out", "--holdout", "--fraction"],
         "the problem says which poses are held out: held_out = { fraction = 0.3, seed = 1 } in [data]",
     ),
-    (&["-d", "--file", "--files", "--measurements"], "--data FILE names measurement files"),
+    (
+        &["-d", "--file", "--files", "--measurements", "--input", "-i", "--table", "--csv"],
+        "--data FILE names measurement files",
+    ),
+    (
+        &["--targets", "--target", "--waypoints", "--points"],
+        "tables of targets follow --data, as in flexcal compensate PROBLEM --estimate \
+         estimate.json --data TARGETS.csv",
+    ),
+    (
+        &["-e", "--est", "--result", "--results", "--calibration"],
+        "--estimate FILE names the estimate.json of an identification",
+    ),
+    (
+        &["-p", "--problem", "--config", "-c"],
+        "the problem needs no option: it is the first argument after the command",
+    ),
+    (
+        &["-n", "--number", "--count", "--num-poses", "--n-poses"],
+        "--poses N is the number of poses",
+    ),
+    (&["-f", "--overwrite", "--yes", "-y"], "--force replaces files that were changed"),
+    (
+        &["--free", "--fix", "--fixed", "--hold", "--parameters", "--params"],
+        "the problem says which parameters are fitted: its section [parameters]",
+    ),
+    (
+        &["--strategies", "--solvers"],
+        "compare fits with every strategy and solver; identify --strategy and --solver choose one",
+    ),
+    (
+        &["--effect", "--effects", "--max-effects", "--candidates-of", "--laws"],
+        "trace and loop try every effect and need no limit; the problem declares effects that are \
+         always fitted: [[effect]]",
+    ),
+    (
+        &["-j", "--threads", "--jobs"],
+        "the environment variable RAYON_NUM_THREADS sets the number of threads",
+    ),
     (
         &["--sigma", "--position-sigma", "--position_sigma_mm"],
         "the problem says how accurate the instrument is: position_sigma_mm = 0.05 in [data]",
@@ -26,6 +64,8 @@ const MISTAKEN_WORDS: [(&[&str], &str); 6] = [
         &["urdf", "URDF"],
         "leave --format out to write a URDF: --urdf ARM.urdf names the one to change",
     ),
+    (&["lm", "LM", "levmar", "marquardt"], "levenberg-marquardt is the name of that solver"),
+    (&["gn", "GN", "newton"], "gauss-newton is the name of that solver"),
     (&["csv", "CSV"], "mdh or dh write the table of Denavit-Hartenberg parameters, as YAML"),
 ];
 
@@ -45,6 +85,11 @@ const SYNONYMS: [(&str, &[&str]); 6] = [
 /// Adds a tip to the error of wrong arguments if a usual mistake is recognised. `words` are the
 /// arguments, with the name of the program first; `cli` has the commands.
 pub fn with_tip(mut error: clap::Error, words: &[OsString], cli: &Command) -> clap::Error {
+    // The tip to write an unknown option behind `--` as a value leads nowhere.
+    if error.kind() == ErrorKind::UnknownArgument && error.get(ContextKind::SuggestedArg).is_none()
+    {
+        error.remove(ContextKind::Suggested);
+    }
     if let Some(tip) = tip(&error, words, cli) {
         error.remove(ContextKind::SuggestedArg);
         error.remove(ContextKind::SuggestedSubcommand);
@@ -73,7 +118,7 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
                     Some(format!("write a command first, as in flexcal identify {named}"))
                 }
                 Some((command, _)) => Some(format!("flexcal {command} may be meant")),
-                None => None,
+                None => inner_command(&word, cli),
             }
         }
         ErrorKind::MissingRequiredArgument if first == "export" => {
@@ -102,10 +147,30 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
             elsewhere.map(|(_, tip)| (*tip).to_owned()).or_else(|| {
                 let other = || other_command(word, first, cli);
                 let table = || table_without_option(word, first);
-                negative_number(words).or_else(other).or_else(table).filter(|_| is_unknown)
+                let spaced = || unquoted(word, words);
+                let found = negative_number(words).or_else(other).or_else(table).or_else(spaced);
+                found.filter(|_| is_unknown)
             })
         }
     }
+}
+
+/// Returns the tip for a command that is part of another one, as `merge` is of `study`; `None` if
+/// `word` is no such command.
+fn inner_command(word: &str, cli: &Command) -> Option<String> {
+    let outer = cli.get_subcommands().find(|outer| outer.find_subcommand(word).is_some())?;
+    Some(format!("flexcal {} {word} may be meant", outer.get_name()))
+}
+
+/// Returns the tip for a second word of a value; `None` if no word precedes it that follows an
+/// option.
+fn unquoted(word: &str, words: &[OsString]) -> Option<String> {
+    let words: Vec<&str> = words.iter().filter_map(|word| word.to_str()).collect();
+    let place = words.iter().position(|other| *other == word)?;
+    let [option, first] = words.get(place.checked_sub(2)?..place)? else { return None };
+    let is_option = option.starts_with("--") && !option.contains('=') && !first.starts_with('-');
+    (is_option && !word.starts_with('-'))
+        .then(|| format!("a value with a space needs quotes: {option} \"{first} {word}\""))
 }
 
 /// Returns the tip for a negative number after an option, which the parser takes for another

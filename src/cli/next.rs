@@ -8,14 +8,17 @@ use flexcal::design::{
     self, Candidates, Explanations, NextOptions, NextPoses, Purpose, StopReason,
 };
 use flexcal::fit::Options;
+use flexcal::life;
 use flexcal::measurement::Measurements;
 use flexcal::problem::{PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, NextResult, poses_csv};
 
+use super::estimate::Trust;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::Results;
+use super::plan::columns_at_hand;
 use super::poses::{Region, Source};
 use super::progress::Line;
 use super::{diagnostic, interrupt, values};
@@ -59,6 +62,15 @@ pub struct Arguments {
     /// makes them
     #[arg(long)]
     remainder: bool,
+    /// Prior of the measured poses: the estimate.json that they update, or the PRIOR.toml of arms of
+    /// the same type, as for identify
+    #[arg(long, value_name = "ESTIMATE.json|PRIOR.toml", conflicts_with = "remainder")]
+    prior: Option<PathBuf>,
+    /// Days since the earlier identification, by whose drift the prior is widened
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0, requires = "prior", value_parser = values::days)]
+    drift: f64,
+    #[command(flatten)]
+    trust: Trust,
     #[command(flatten)]
     region: Region,
     #[command(flatten)]
@@ -82,10 +94,18 @@ impl Arguments {
             words.push(format!("--level {}", self.level));
         }
         words.extend(self.remainder.then(|| "--remainder".to_owned()));
+        words.extend(self.prior_words());
         words.extend(self.region.words());
         words.extend(self.source.candidates.iter().map(|file| path("--pool", file)));
         words.extend(self.source.truth.iter().map(|file| path("--truth", file)));
         if words.is_empty() { String::new() } else { format!(" {}", words.join(" ")) }
+    }
+
+    /// Formats the arguments of the prior.
+    fn prior_words(&self) -> Vec<String> {
+        let prior = self.prior.iter().map(|file| format!("--prior {}", shell_word(file)));
+        let drift = (self.drift > 0.0).then(|| format!("--drift {}", self.drift));
+        prior.chain(drift).collect()
     }
 }
 
@@ -143,15 +163,16 @@ fn other_rows(file: &Path, (missing, of): (usize, usize)) -> Option<String> {
 /// that is expected after them.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
+    let others = [source.files(), arguments.prior.iter().cloned().collect()].concat();
     let Input { problem, data, results } =
-        common.read_beside("next", &source.files(), &["next.json", "next.html", "next.csv"])?;
+        common.read_beside("next", &others, &["next.json", "next.html", "next.csv"])?;
     let candidates = match source.table(&problem, common)? {
         Some(rows) => Candidates::Rows(Box::new(rows)),
-        None => Candidates::Within(match source.known_ranges(&problem)? {
-            Some(ranges) => ranges.relevant_to(&problem),
-            None => PoseRanges::declared_or_measured(&problem, &data.measurements),
-        }),
+        None if source.truth.is_some() => Candidates::Within(source.ranges(&problem)?),
+        None => Candidates::Within(PoseRanges::declared_or_measured(&problem, &data.measurements)),
     };
+    let prior =
+        arguments.prior.as_deref().map(|file| arguments.trust.read_prior(file)).transpose()?;
     let explanations = if arguments.purpose == Purpose::Accuracy {
         None
     } else {
@@ -163,6 +184,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let workspace = arguments.region.workspace()?;
     common.warn_if_tiny(arguments.tolerance_mm);
     let stop = interrupt::stop();
+    let fit = Options::default().with_stop(stop.clone());
+    let update = prior
+        .map(|prior| life::update(&problem, &data, &fit, &prior, arguments.drift))
+        .transpose()?;
     let (next, options) = Line::during(common.prints_text(), stop.clone(), |sink| {
         let options = NextOptions {
             poses: arguments.poses as usize,
@@ -173,7 +198,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             workspace: workspace.as_ref(),
             explanations: explanations.as_ref(),
             remainder: arguments.remainder,
-            fit: Options::default().with_stop(stop).with_progress(sink),
+            fit: fit.with_progress(sink),
+            update: update.as_ref().map(|of| (&of.found, of.predictions.as_ref())),
         };
         design::next(&problem, &data, &candidates, &options).map(|next| (next, options))
     })?;
@@ -237,13 +263,14 @@ fn next_step(
         String::new()
     };
     if next.poses.is_empty() {
-        return format!("{lacks}flexcal identify {arguments} writes the estimate to apply");
+        let prior: String = asked.prior_words().iter().map(|word| format!(" {word}")).collect();
+        return format!("{lacks}flexcal identify {arguments}{prior} writes the estimate to apply");
     }
     let file = shell_word(common.problem());
     if problem.data.joint_log.is_some() {
         return format!(
-            "{lacks}measure these poses, append them to the measurements and to the joint table \
-             of {file}, then flexcal next {file}{flags}{}",
+            "{lacks}measure these poses, append them to the measurements and, unless these hold the \
+             joints, to the joint table of {file}, then flexcal next {file}{flags}{}",
             common.data_arguments()
         );
     }
@@ -264,10 +291,12 @@ fn next_step(
             "take an image in each of these poses, write a row for each point that is found, then"
                 .to_owned()
         }
-        [first, ..] => format!(
-            "measure {these}, add the columns x_mm, y_mm, z_mm and the others of {}, then",
-            first.display()
-        ),
+        [_, ..] => {
+            let at_hand: Vec<&PathBuf> = files.iter().collect();
+            let others = columns_at_hand(&at_hand, (problem, &next.poses), false);
+            let others: String = others.iter().map(|name| format!(", {name}")).collect();
+            format!("measure {these}, add the columns x_mm, y_mm, z_mm{others}, then")
+        }
         [] => format!("measure {these}, add the columns x_mm, y_mm, z_mm, then"),
     };
     let measured: Vec<String> = files.iter().map(|file| shell_word(file)).collect();

@@ -74,7 +74,7 @@ const CRITERIA: [(&str, &str, Criterion); 5] = [
 /// accuracy that the plan is expected to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
-    let declared = Problem::read(common.problem())?;
+    let declared = common.read_problem()?;
     if declared.data.fits_orientation && !arguments.separate.is_empty() {
         common.hint(["effects are told apart by positions: orientations do not count"]);
     }
@@ -149,7 +149,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 
 /// Returns the columns that the measurements in `files` have and a table of planned poses lacks. All
 /// tables that are read together have the same columns. Empty if the files cannot be read.
-fn columns_at_hand(
+pub(super) fn columns_at_hand(
     files: &[&PathBuf],
     (problem, poses): (&Problem, &Measurements),
     is_of_cameras: bool,

@@ -7,7 +7,7 @@ use clap::Args;
 use flexcal::fit::{self, Residual};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::nalgebra::Vector3;
-use flexcal::problem::{HeldOut, Problem};
+use flexcal::problem::HeldOut;
 use flexcal::remainder::{self, Bounds, Compared, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
@@ -57,10 +57,10 @@ const RESULT_FILES: [&str; 4] =
 /// Predicts the rows, writes predictions, residuals and errors, and prints the errors.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let problem = Problem::read(common.problem())?;
+    let problem = common.read_problem()?;
     let results =
         common.results("predict", &problem, arguments.estimate.as_slice(), &RESULT_FILES)?;
-    let (rows, warnings) = Measurements::read_to_predict(common.files(&problem), &problem)?;
+    let (rows, warnings) = common.read_rows(&problem, Measurements::read_to_predict)?;
     let rows = rows.arm_rows();
     common.warn(&warnings);
     let read = |file| arguments.trust.read(file);

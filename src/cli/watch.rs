@@ -4,9 +4,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use flexcal::fit::SavedEstimate;
 use flexcal::life::{self, CauseKind};
 use flexcal::measurement::Measurements;
-use flexcal::problem::Problem;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, WatchResult};
 
@@ -42,6 +42,18 @@ fn drift_argument(days: f64) -> String {
     if days > 0.0 { format!(" --drift {days}") } else { String::new() }
 }
 
+/// Returns a warning that the rows were measured days after the rows of the estimate, if both have
+/// dates; `None` if less than a day lies between them.
+fn age(estimate: &SavedEstimate, rows: &Measurements) -> Option<String> {
+    let days = estimate.days_until(rows)?.round();
+    (days >= 1.0).then(|| {
+        format!(
+            "these rows were measured {days} days after those of the estimate; --drift {days} allows for what changes in that time without \
+             a cause"
+        )
+    })
+}
+
 /// Returns the name of a folder beside that of an estimate which does not exist yet, as a word of a
 /// suggested command: `out/arm-update` beside `out/arm`, then `out/arm-update-2`.
 fn unused_folder(estimate: &Path, what: &str) -> String {
@@ -63,13 +75,13 @@ fn unused_folder(estimate: &Path, what: &str) -> String {
 /// the verdict.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let mut problem = Problem::read(common.problem())?;
+    let mut problem = common.read_problem()?;
     // Every row is judged, so none is held out, and the table needs no column that marks such rows.
-    problem.data.held_out = None;
+    let held_out = problem.data.held_out.take();
     let estimate_file = std::slice::from_ref(&arguments.estimate);
     let results =
         common.results("watch", &problem, estimate_file, &["watch.json", "watch.html"])?;
-    let (rows, mut warnings) = Measurements::read_to_judge(common.files(&problem), &problem)?;
+    let (rows, mut warnings) = common.read_rows(&problem, Measurements::read_to_judge)?;
     warnings.extend(rows.row_warnings(&problem));
     common.warn(&warnings);
     let estimate = arguments.trust.read(&arguments.estimate)?;
@@ -77,12 +89,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
     }
     common.warn_of_loads(&problem, &estimate, &rows);
-    common.hint(estimate.unknown_sessions(&rows).into_iter().map(|session| {
+    let unknown: Vec<String> =
+        estimate.unknown_sessions(&rows).into_iter().map(str::to_owned).collect();
+    common.hint(unknown.iter().map(|session| {
+        let (what, tool) = match rows.target {
+            Some(_) => ("base is", ""),
+            None => ("base and tool are", "; a column target holds the tool"),
+        };
         format!(
-            "the estimate does not know session {session}: its base is fitted to these rows, so that a base or an instrument that has moved \
-             cannot be seen; if it stands where it stood, give the rows the session of the estimate"
+            "the estimate does not know session {session}: its {what} fitted to these rows, so that a move of them cannot be seen; if \
+             all stands where it stood, give the rows the session of the estimate{tool}"
         )
     }));
+    if arguments.drift == 0.0 {
+        common.hint(age(&estimate, &rows));
+    }
     let settings = (arguments.drift, arguments.false_alarms);
     let rows = rows.arm_rows();
     let watch = life::watch(&problem, &estimate, &rows, settings)?;
@@ -93,6 +114,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.print_result(&json, || {
         let file = shell_word(&arguments.estimate);
         let first = watch.causes.first().map(|cause| cause.kind);
+        let held_out = advice::held_out_argument(held_out.as_ref(), &rows.pose_numbers(&problem));
+        let update = || {
+            format!(
+                "flexcal identify {} --prior {file}{}{held_out} --out {}",
+                common.problem_arguments(),
+                drift_argument(arguments.drift),
+                unused_folder(&arguments.estimate, "update")
+            )
+        };
         let next = if watch.is_changed() && first == Some(CauseKind::Other) {
             format!(
                 "flexcal identify {} --out {}: if that fit is trusted, the arm has changed or is \
@@ -101,18 +131,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 common.problem_arguments(),
                 unused_folder(&arguments.estimate, "check")
             )
+        } else if watch.is_changed() && first == Some(CauseKind::Misread) {
+            format!(
+                "correct the table, then flexcal watch {} --estimate {file}",
+                common.problem_arguments()
+            )
         } else if watch.is_changed() && first == Some(CauseKind::Noise) {
             "measure a few of these poses again. If watch.html shows the evidence rise from some row on, give the rows from there on alone"
                 .to_owned()
         } else if watch.is_changed() && first == Some(CauseKind::Row) {
             format!("check that row, then flexcal watch {} --estimate {file} without it", common.problem_arguments())
         } else if watch.is_changed() {
-            let update = format!(
-                "flexcal identify {} --prior {file}{} --out {} takes the change over into an estimate",
-                common.problem_arguments(),
-                drift_argument(arguments.drift),
-                unused_folder(&arguments.estimate, "update")
-            );
+            let update = format!("{} takes the change over into an estimate", update());
             if first == Some(CauseKind::Base) {
                 format!(
                     "if the instrument or the arm was set up anew, give these rows another word in a column session and watch again; if both \
@@ -123,11 +153,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             }
         } else if watch.has_drifted() {
             format!(
-                "flexcal identify {} --prior {file}{} --out {} takes the drift over into an estimate, because the old one errs by more than its bounds say",
-                common.problem_arguments(),
-                drift_argument(arguments.drift),
-                unused_folder(&arguments.estimate, "update")
+                "{} takes the drift over into an estimate, because the old one errs by more than its bounds say",
+                update()
             )
+        } else if !unknown.is_empty() {
+            format!("{} adds the session to the estimate", update())
         } else {
             advice::after_applying(common, &problem, &estimate, &arguments.estimate)
         };

@@ -64,7 +64,9 @@ impl PoseRanges {
         payloads.sort_by(f64::total_cmp);
         payloads.dedup();
         let joints = problem.joints.iter().enumerate().map(of_joint).collect();
-        Self { joints, payloads, ..Self::default() }
+        let measured = |of: &Option<Vec<f64>>| of.as_ref().map(|of| range(of.iter().copied()));
+        let (hoist, temperature) = (measured(&rows.hoist), measured(&rows.temperature));
+        Self { joints, payloads, hoist, temperature, ..Self::default() }.relevant_to(problem)
     }
 
     /// Draws `count` poses from the ranges; measured positions are set to 0. A larger count leaves

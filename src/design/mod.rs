@@ -19,6 +19,7 @@ mod misfit;
 mod next;
 mod plan;
 mod pool;
+mod posterior;
 mod scan;
 mod sensitivity;
 mod separate;

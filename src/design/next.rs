@@ -7,13 +7,14 @@ use super::explanations::{Explanations, ExplanationsError};
 use super::greedy::Greedy;
 use super::misfit::Misfit;
 use super::pool::{Pool, pool_and_workspace};
+use super::posterior::posterior_rows;
 use super::workspace_error::{MisfitSize, WorkspaceError};
 use super::{Candidates, Criterion, DesignError, Exchange, Sensitivity, Site, Workspace, views};
 use crate::fit::{self, FindingCode, Identification, IdentifyError, Options};
 use crate::measurement::{Dataset, Measurements};
 use crate::numeric::range;
 use crate::problem::{Effect, Problem};
-use crate::remainder::{self, Correction, SavedRemainderError};
+use crate::remainder::{self, Correction, Fitted, SavedRemainderError};
 
 /// Fraction of the largest gain from which on candidates count as equally good; the least travel of
 /// the joints then decides.
@@ -71,6 +72,9 @@ pub struct NextOptions<'a> {
     pub remainder: bool,
     /// Settings of the fit to the measured poses.
     pub fit: Options,
+    /// Update of an earlier estimate by the measured poses, with the uncertainty of its
+    /// predictions; `None` to fit these poses alone.
+    pub update: Option<(&'a Identification, Option<&'a Fitted>)>,
 }
 
 /// Travel to a chosen pose, and the expected benefit of measuring it.
@@ -205,7 +209,11 @@ pub fn next(
     if poses == 0 {
         return Err(DesignError::NoPoses.into());
     }
-    let found = fitted(problem, data, options)?;
+    options.explanations.map_or(Ok(()), |of| of.check_rows(&data.measurements))?;
+    let found = match options.update {
+        Some((found, _)) => found.clone(),
+        None => fitted(problem, data, options)?,
+    };
     let explanations = options.explanations.filter(|_| options.purpose != Purpose::Accuracy);
     if options.purpose != Purpose::Accuracy
         && explanations.is_none_or(|of| of.open().next().is_none())
@@ -245,7 +253,12 @@ pub fn next(
     }
     let size = MisfitSize::of(&found, has_declared_noise);
     let misfit = (!is_of_cameras).then(|| Misfit::new(&site, &reference, size.misfit, seed));
-    let unknowns = Unknowns::of(&site.model.parameters);
+    let mut unknowns = Unknowns::of(&site.model.parameters);
+    let posterior = options.update.map(|_| posterior_rows(&site, &found, sensitivity.coordinates));
+    if let Some((_, known)) = &posterior {
+        // The posterior contains the priors.
+        known.iter().for_each(|&k| unknowns.sigmas[k] = None);
+    }
     let unknowns = match &misfit {
         Some(misfit) => unknowns.and_standard(misfit.weights()),
         None => unknowns,
@@ -256,17 +269,23 @@ pub fn next(
         None => of,
     };
     let (given_rows, given) = site.in_equilibrium(&measured);
-    let given = extended(&given_rows, given, None);
+    let given = match posterior {
+        Some((Sensitivity { rows, coordinates }, _)) => {
+            Sensitivity { rows: rows.resize_vertically(unknowns.sigmas.len(), 0.0), coordinates }
+        }
+        None => extended(&given_rows, given, None),
+    };
     let sensitivity = extended(&pool, sensitivity, None);
     let unit = (!is_of_cameras).then_some(1.0);
     let predicted = extended(&reference, site.sensitivity(&reference, unit), unit);
     let prediction = mean_square(&predicted);
     let cause = explanations.map(|of| cause_goal(&site, &of.parameters(&designed), &prediction));
     // Errors of left-out configurations give no bounds if the priors determine the parameters.
-    let correction = if is_of_cameras || found.has(FindingCode::PriorsDecide) {
-        None
-    } else {
-        correction(problem, data, &found, options)?
+    let correction = match options.update {
+        _ if is_of_cameras => None,
+        Some((_, fitted)) => fitted.map(|fitted| fitted.correction().clone()),
+        None if found.has(FindingCode::PriorsDecide) => None,
+        None => correction(problem, data, &found, options)?,
     };
     let error = match &correction {
         Some(correction) => {
@@ -335,7 +354,6 @@ fn fitted(
     data: &Dataset,
     options: &NextOptions,
 ) -> Result<Identification, NextError> {
-    options.explanations.map_or(Ok(()), |of| of.check_rows(&data.measurements))?;
     let found = fit::identify(problem, data, &options.fit)?;
     check_interrupt(options)?;
     Ok(found)

@@ -42,7 +42,8 @@ pub(super) fn pool_and_workspace(
         Candidates::Within(ranges) => {
             let drawn = |count: usize, extremes, stream| {
                 let stream = (seed, STREAMS[stream]);
-                site.draw_in_view(ranges, (count, extremes), stream, inside)
+                let (table, count) = site.draw_in_view(ranges, (count, extremes), stream, inside);
+                (in_last_session(table, measured), count)
             };
             let [uniform, often] = DRAWN_CANDIDATES.map(|count| count.max(poses));
             let (pool, count) = drawn(uniform, Extremes::No, 0);
@@ -54,6 +55,16 @@ pub(super) fn pool_and_workspace(
             }
         }
     }
+}
+
+/// Returns the poses of `table` in the session of the last measured row, in which further poses will
+/// be measured.
+fn in_last_session(mut table: Measurements, measured: &Measurements) -> Measurements {
+    let last = measured.session.of_row.last().and_then(|&k| measured.session.names.get(k));
+    if let Some(name) = last.filter(|name| !name.is_empty()) {
+        table.session = (0..table.len()).map(|_| name.as_str()).collect();
+    }
+    table
 }
 
 /// Returns the rows of `table` whose commands and payload no row of `measured` has.

@@ -420,6 +420,10 @@ pub enum InputErrorKind {
         if *others == 0 { String::new() } else { format!(" and of {others} more") }
     )]
     LoadsTooLarge { others: usize },
+        "the nominal arm has no equilibrium under its loads here; the mass {name} of {mass} kg is \
+         {ratio} times as heavy as all others together: check its unit (kg)"
+    )]
+    HeavyMass { name: String, mass: String, ratio: String },
     #[error(
         "the nominal arm has no equilibrium under its loads here; {joint} may be too soft: gravity \
          on the masses beyond it has a moment of up to {moment} N·m, which could turn it by up to {angle} \

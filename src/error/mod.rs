@@ -35,6 +35,7 @@ pub use warning::WarningKind;
 #[doc(hidden)]
 pub use self::{
     causes::{message_with_causes, mistake},
+    near::file_like,
     plain::is_hidden,
 };
 

@@ -1,5 +1,8 @@
 //! Suggestions for misspelt words.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
 use strsim::{damerau_levenshtein, normalized_damerau_levenshtein};
 
 /// Minimum similarity of a suggested word: 1 for the same word, 0 for no common letter.
@@ -25,6 +28,17 @@ pub(crate) fn nearest<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item =
         }
     }
     best.map(|(_, candidate)| candidate)
+}
+
+/// Returns the path of the file in the folder of `path` whose name is most like that of `path`;
+/// `None` if `path` exists or no name is similar.
+pub fn file_like(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent()?;
+    let read = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let name = path.file_name().filter(|_| !path.exists())?.to_string_lossy().into_owned();
+    let entries = fs::read_dir(read).ok()?.flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    nearest(&name, names).map(|name| folder.join(name))
 }
 
 /// Returns true if the words differ only by case or by one inserted, missing, replaced or

@@ -166,13 +166,19 @@ pub(super) fn compared_keys(keys: Option<&[String; 2]>) -> String {
     })
 }
 
+/// Largest deviation \[h\] from a whole number of hours at which clocks are in two time zones.
+const MAX_OFF_HOUR: f64 = 2e-3;
+
 /// Returns the remedy for clocks that differ. `offset` is the value of `offset_s` \[s\] that pairs
 /// most rows; the text is empty for `None`.
 pub(super) fn clock_offset_remedy(offset: Option<&str>) -> String {
     offset.map_or_else(String::new, |offset| {
+        let hours = offset.parse::<f64>().map_or(0.0, |seconds| seconds / 3600.0);
+        let is_zone = hours.abs() > 0.5 && (hours - hours.round()).abs() < MAX_OFF_HOUR;
+        let zone = if is_zone { " (by whole hours, as for summer time or UTC)" } else { "" };
         format!(
             "; with the clock of the joint table moved by {offset} s the rows have partners: the \
-             clocks differ, so write offset_s = {offset} in joints"
+             clocks differ{zone}, so write offset_s = {offset} in joints"
         )
     })
 }

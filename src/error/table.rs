@@ -35,14 +35,23 @@ pub enum TableErrorKind {
     )]
     RepeatedPose { name: String, line: usize },
     #[error(
-        "no row of the measurements has a partner in the joint table; check the column of the \
-         join (pose or time) and \
-         tolerance_s{}{}{}",
+        "no row of the measurements has a partner in the joint table{}{}{}",
         nearest_in_time_hint(gap.as_deref()),
         compared_keys(keys.as_ref()),
-        clock_offset_remedy(offset.as_deref())
+        if offset.is_some() {
+            clock_offset_remedy(offset.as_deref())
+        } else {
+            "; check the column of the join (pose or time), whether both clocks agree, and tolerance_s"
+                .to_owned()
+        }
     )]
     NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<String> },
+    #[error(
+        "{left} of {rows} measured rows have no partner in the joint table, because tolerance_s is \
+         too small: the nearest row is typically {gap} away, and rows of the joint table are \
+         {step} apart; write tolerance_s = {tolerance} in joints"
+    )]
+    ToleranceTooSmall { left: usize, rows: usize, gap: String, step: String, tolerance: String },
     #[error(
         "the times of the {table} are whole minutes, those of the other table are not: a \
          spreadsheet drops seconds; export the times with their seconds, or write by = \"order\" \

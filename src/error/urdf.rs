@@ -75,11 +75,18 @@ pub enum UrdfErrorKind {
         listed(leaves)
     )]
     Leaves { base: String, leaves: Vec<String> },
+    #[error("link \"{tip}\" is not below link \"{base}\", but above it; exchange --base and --tip")]
+    EndsExchanged { base: String, tip: String },
     #[error(
         "link \"{tip}\" is not below link \"{base}\"; {}",
         if above.is_empty() { "it is the root".to_owned() } else { format!("above it are {}", above.join(", ")) }
     )]
     NotBelow { base: String, tip: String, above: Vec<String> },
+    #[error(
+        "no link is called \"{link}\", as [urdf] in problem \"{problem}\" says; give the URDF of which flexcal init made \
+         the problem: this one is of robot \"{robot}\""
+    )]
+    OtherRobot { link: String, problem: String, robot: String },
     #[error(
         "no joint moves between \"{base}\" and \"{tip}\"{}",
         if base == tip { "; the file holds this link alone: take the URDF of the whole arm" } else { "" }

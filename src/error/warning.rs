@@ -22,11 +22,18 @@ pub enum WarningKind {
         file.display()
     )]
     MapUnused { file: PathBuf },
+    #[error(
+        "these measurements are paired row by row with the joint table {}; if that is of other \
+         measurements, name theirs with --joints",
+        file.display()
+    )]
+    JointTableKept { file: PathBuf },
     #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
     Unmapped { names: Vec<String> },
     #[error(
-        "{rows} row{} without a partner in the other table, the first here{}; left out{}{}",
+        "{rows} row{} without a partner in the other table, the first here{}; left out{}{}{}",
         plural(*rows), listed(*rows, others), nearest_in_time_hint(gap.as_deref()),
+        if gap.is_some() { "; check whether both clocks agree, and tolerance_s" } else { "" },
         spelling_hint(alike.as_ref())
     )]
     WithoutPartner {
@@ -374,10 +381,7 @@ fn spelling_hint(alike: Option<&(usize, [String; 2])>) -> String {
 /// usual distance in words; the hint is empty for `None`.
 pub(super) fn nearest_in_time_hint(gap: Option<&str>) -> String {
     gap.map_or_else(String::new, |gap| {
-        format!(
-            " (the nearest row of the joint table is typically {gap} away; check whether both \
-             clocks agree, and tolerance_s)"
-        )
+        format!(" (the nearest row of the joint table is typically {gap} away)")
     })
 }
 

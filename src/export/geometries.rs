@@ -89,6 +89,14 @@ impl Geometry {
         }
     }
 
+    /// Returns true if the rows of `data` that judge it show the errors of this geometry. Only
+    /// positions show those of an approximation of the whole model.
+    #[doc(hidden)]
+    pub fn can_be_judged(&self, data: &Dataset) -> bool {
+        let rows = &data.measurements;
+        self.best_rigid.is_none() || (0..rows.len()).all(|row| rows.observation(row).is_position())
+    }
+
     /// Computes errors of three geometries: this one, the approximation of the whole model, and the
     /// fit of a rigid model. They are errors on the held-out rows, or on the fitted rows if none is
     /// held out. The first is `None` if this is the identified geometry. The others are `None` if

@@ -4,6 +4,20 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::Path;
 
+/// Maximum number of files in a folder that a message lists.
+const MAX_LISTED_NAMES: usize = 6;
+
+/// Returns the names of the files in a folder in alphabetical order, without hidden ones; empty if
+/// the folder cannot be read.
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let files = entries.filter(|entry| entry.path().is_file());
+    let names = files.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
+    names.sort();
+    names
+}
+
 /// Opens a file for reading; see [`open`](super::open) for the files that are refused.
 ///
 /// # Errors
@@ -19,7 +33,14 @@ pub(super) fn open(path: &Path) -> io::Result<File> {
         Err(io::Error::new(io::ErrorKind::InvalidInput, message))
     };
     if kind.is_dir() {
-        return refused("folder");
+        let names = names_in(path);
+        let listed = names.get(..MAX_LISTED_NAMES).unwrap_or(&names).join(", ");
+        let message = if names.is_empty() {
+            "it is a folder without files; give a file".to_owned()
+        } else {
+            format!("it is a folder; give a file in it, such as {listed}")
+        };
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
     }
     if !kind.is_file() {
         return refused("FIFO, socket or device");

@@ -42,7 +42,7 @@ pub use apply::saved_estimate_error::SavedEstimateError;
 #[doc(hidden)]
 pub use apply::tolerance::{Tolerance, ToleranceTest, Verdict};
 pub use checks::finding::{Finding, FindingCode, Severity};
-pub(crate) use checks::misreading::MisreadEffect;
+pub(crate) use checks::misreading::{MisreadEffect, misread_table};
 pub(crate) use checks::open_directions::{open_quantities, open_scale};
 pub use checks::outliers::{InfluentialRows, Outlier};
 pub use checks::point_spread::PointSpread;

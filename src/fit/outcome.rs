@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::fit::checks::finding::{Finding, FindingCode, Severity};
+use crate::fit::checks::finding::{Finding, FindingCode, MISTAKES, Severity};
 use crate::fit::checks::misreading::MisreadEffect;
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::NoiseModel;
@@ -201,6 +201,11 @@ impl Identification {
     #[doc(hidden)]
     pub fn first_error(&self) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.severity() == Severity::Error)
+    }
+
+    /// Returns true if a finding names a mistake of the input.
+    pub(crate) fn names_mistake(&self) -> bool {
+        MISTAKES.iter().any(|code| self.has(*code))
     }
 
     /// Returns the first finding with the code `code`; `None` if no check reported it.

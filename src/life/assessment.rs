@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::causes::{Cause, CauseKind, LARGER_SIZE_RATIO};
+use super::causes::{Cause, CauseKind};
 use super::evidence::{NOISE_RATIOS, OTHER_RATIOS, Unchanged, ln_sum};
 use super::rows::{SensitiveRows, Sums};
 
@@ -96,17 +96,15 @@ pub(super) fn weighted_cause(
 ) -> Option<Weighted> {
     let columns: Vec<usize> = cause.columns.iter().map(|&k| columns[k]).collect();
     let tried: Vec<_> = cause
-        .trial_sigmas
+        .trials
         .iter()
-        .zip(ln_size_priors(cause))
-        .filter_map(|(sizes, ln_prior)| {
-            Some((unchanged.likelihood_ratio(&columns, sizes)?, sizes, ln_prior))
+        .filter_map(|trial| {
+            let (ratio, mean, covariance) = unchanged.likelihood_ratio(&columns, &trial.sigmas)?;
+            Some((ratio + trial.ln_prior, &trial.sigmas, mean, covariance))
         })
         .collect();
-    let ratios = tried.iter().map(|((ratio, ..), _, ln_prior)| ratio + ln_prior);
-    let ln_share = ln_sum(ratios) + cause.ln_weight;
-    let best = tried.into_iter().max_by(|a, b| (a.0.0 + a.2).total_cmp(&(b.0.0 + b.2)));
-    let ((_, mean, covariance), sizes, _) = best?;
+    let ln_share = ln_sum(tried.iter().map(|entry| entry.0)) + cause.ln_weight;
+    let (_, sizes, mean, covariance) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(Weighted { ln_share, sizes: sizes.clone(), mean, covariance })
 }
 
@@ -162,14 +160,6 @@ pub(super) fn assess(
         .collect();
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     Some(Assessment { looks, causes, ln_sum: all, chi2, coordinates: sums.coordinates })
-}
-
-/// Returns the logarithms of the prior probabilities of the trial sizes of a cause, the smallest
-/// size first; the probabilities sum to 1. All sizes of causes by temperature are equally probable.
-fn ln_size_priors(cause: &Cause) -> impl Iterator<Item = f64> {
-    let larger = if cause.kind == CauseKind::Temperature { 1.0 } else { LARGER_SIZE_RATIO };
-    let sum: f64 = (0..cause.trial_sigmas.len()).map(|size| larger.powf(size as f64)).sum();
-    (0..cause.trial_sigmas.len()).map(move |size| size as f64 * larger.ln() - sum.ln())
 }
 
 /// Computes the weighted likelihood ratio of each cause, and of a gross error of each of the first

@@ -14,7 +14,7 @@ use crate::quantity::Unit;
 /// Prior probability of a trial size of a change, relative to that of the next smaller one. A
 /// change of k times the size has k² times the evidence, so large changes are found all the same.
 /// Sizes of causes by temperature are equally probable instead.
-pub(super) const LARGER_SIZE_RATIO: f64 = 0.4;
+const LARGER_SIZE_RATIO: f64 = 0.4;
 /// Trial sizes of a moved zero of a joint, 1 σ \[°\] or \[mm\], the smallest first.
 const ZERO_SIZES: [f64; 4] = [0.01, 0.05, 0.25, 1.2];
 /// Trial sizes of a moved target, base or fixture, 1 σ on each axis \[mm\]; rotations \[°\] are a
@@ -57,10 +57,14 @@ worded! {
         Law = "law";
         /// Temperature of the arm.
         Temperature = "temperature";
+        /// Two of the causes above together.
+        Two = "two";
         /// Noise of the measurement.
         Noise = "noise";
         /// Gross error of one row.
         Row = "row";
+        /// Mistake in the table, with which the unchanged arm agrees: a unit, sign, order or column.
+        Misread = "misread";
         /// Large errors without a pattern, which none of these causes explains.
         Other = "other";
     }
@@ -94,6 +98,25 @@ impl CauseKind {
     }
 }
 
+/// Trial size of a change.
+#[derive(Debug, Clone)]
+pub(super) struct Trial {
+    /// Prior standard deviation (1 σ) of each amplitude.
+    pub sigmas: Vec<f64>,
+    /// Logarithm of the prior probability among the trials of the cause.
+    pub ln_prior: f64,
+}
+
+/// Returns trials of these sizes, the smallest first. Each is `larger` times as probable as the
+/// next smaller one, and the probabilities sum to 1.
+fn trials(sizes: impl IntoIterator<Item = Vec<f64>>, larger: f64) -> Vec<Trial> {
+    let sizes: Vec<Vec<f64>> = sizes.into_iter().collect();
+    let sum: f64 = (0..sizes.len()).map(|size| larger.powf(size as f64)).sum();
+    let ln_prior = |size: usize| size as f64 * larger.ln() - sum.ln();
+    let of_size = |(size, sigmas)| Trial { sigmas, ln_prior: ln_prior(size) };
+    sizes.into_iter().enumerate().map(of_size).collect()
+}
+
 /// Possible cause of a change.
 #[derive(Debug, Clone)]
 pub(super) struct Cause {
@@ -102,10 +125,13 @@ pub(super) struct Cause {
     pub label: String,
     /// Columns of the sensitivities that the cause moves.
     pub columns: Vec<usize>,
+    /// Parameters that each of these columns moves together, with the change of each for a unit
+    /// amplitude.
+    pub terms: Vec<Vec<(usize, f64)>>,
     /// Name and unit of each amplitude.
     pub amplitudes: Vec<(String, Unit)>,
-    /// Standard deviations of the amplitudes in each trial, one vector for each size of a change.
-    pub trial_sigmas: Vec<Vec<f64>>,
+    /// Trials, one for each size of a change.
+    pub trials: Vec<Trial>,
     /// Logarithm of the prior probability, given that something changed.
     pub ln_weight: f64,
 }
@@ -198,11 +224,12 @@ impl Extended {
             let all = self.model.parameters.iter().enumerate();
             all.filter(|(_, parameter)| choose(parameter.site, parameter)).map(|(k, _)| k).collect()
         };
-        let mut push = |kind, label: String, columns: Vec<usize>, trial_sigmas: Vec<Vec<f64>>| {
+        let mut push = |kind, label: String, columns: Vec<usize>, sizes: Vec<Vec<f64>>| {
             if !columns.is_empty() {
                 let amplitudes = columns.iter().map(|&k| (self.name(k), self.unit(k))).collect();
-                let ln_weight = 0.0;
-                causes.push(Cause { kind, label, columns, amplitudes, trial_sigmas, ln_weight });
+                let (trials, ln_weight) = (trials(sizes, LARGER_SIZE_RATIO), 0.0);
+                let terms = columns.iter().map(|&k| vec![(k, 1.0)]).collect();
+                causes.push(Cause { kind, label, columns, terms, amplitudes, trials, ln_weight });
             }
         };
         let mixed = |columns: &[usize], length_mm: f64, angle_deg: f64| -> Vec<f64> {
@@ -299,8 +326,9 @@ impl Extended {
             kind,
             label: label.to_owned(),
             columns: Vec::new(),
+            terms: Vec::new(),
             amplitudes: Vec::new(),
-            trial_sigmas: Vec::new(),
+            trials: Vec::new(),
             ln_weight: 0.0,
         };
         causes.push(none(
@@ -392,26 +420,35 @@ impl Extended {
             Some(_) => (Unit::PerDegree, 0.1),
             None => (Unit::Ratio, 1.0),
         };
-        let thermal = |label: String, column, amplitude, sizes: &[f64]| Cause {
-            kind: CauseKind::Temperature,
-            label,
-            columns: vec![column],
-            amplitudes: vec![amplitude],
-            trial_sigmas: sizes.iter().map(|&size| vec![size]).collect(),
-            ln_weight: 0.0,
-        };
+        // The change of a parameter at the mean temperature of the rows.
+        let mean = warmth.map_or(1.0, |warmth| warmth.iter().sum::<f64>() / warmth.len() as f64);
+        let thermal =
+            |label: String, (column, terms): (usize, &[_]), amplitude, sizes: &[f64]| Cause {
+                kind: CauseKind::Temperature,
+                label,
+                columns: vec![column],
+                terms: vec![terms.iter().map(|&(k, factor)| (k, mean * factor)).collect()],
+                amplitudes: vec![amplitude],
+                trials: trials(sizes.iter().map(|&size| vec![size]), 1.0),
+                ln_weight: 0.0,
+            };
         let all = rows.add_column(&lengths, of_row);
         let sizes = STRAIN_SIZES.map(|size| part * size);
         let expansion = ("strain of all links".to_owned(), unit);
-        let mut causes =
-            vec![thermal("temperature: all links expand".to_owned(), all, expansion, &sizes)];
+        let mut causes = vec![thermal(
+            "temperature: all links expand".to_owned(),
+            (all, &lengths),
+            expansion,
+            &sizes,
+        )];
         for joint in (0..problem.joints.len()).filter(|_| warmth.is_some()) {
             let Some(zero) = column(joint, JointField::Theta) else { continue };
-            let column = rows.add_column(&[(zero, 1.0)], of_row);
+            let moved = [(zero, 1.0)];
+            let column = rows.add_column(&moved, of_row);
             let number = joint + 1;
             let amplitude = (format!("joint{number}.theta per kelvin"), Unit::AnglePerDegree);
             let label = format!("temperature: zero of joint {number} follows it");
-            causes.push(thermal(label, column, amplitude, &JOINT_THERMAL_SIZES));
+            causes.push(thermal(label, (column, &moved), amplitude, &JOINT_THERMAL_SIZES));
         }
         causes
     }

@@ -17,8 +17,9 @@ pub(super) struct Contradiction {
     pub label: String,
     /// Probability of the cause, given that something changed.
     pub probability: f64,
-    /// Indices of the model's parameters whose prior is widened, with the size of their change.
-    pub widened: Vec<(usize, f64)>,
+    /// Independent changes by which the prior is widened. Each lists the indices of the model's
+    /// parameters that change together, with the size of their change.
+    pub widened: Vec<Vec<(usize, f64)>>,
     /// Placement whose pose is fitted without its prior, with the full parameter vector at its new
     /// pose.
     pub relocated: Option<(Placed, DVector<f64>)>,
@@ -50,7 +51,8 @@ impl Contradiction {
     /// `moved`. A camera or marker that was moved says nothing of where it stands now.
     pub fn with_place(self, moved: &[(Placed, DVector<f64>)]) -> Self {
         let is_it = |(placed, _): &&(Placed, DVector<f64>)| {
-            !placed.is_base && self.widened.iter().map(|(k, _)| k).eq(&placed.parameters)
+            let moved = self.widened.iter().flatten().map(|(k, _)| k);
+            !placed.is_base && moved.eq(&placed.parameters)
         };
         match moved.iter().find(is_it) {
             Some(found) => Self { widened: Vec::new(), relocated: Some(found.clone()), ..self },
@@ -111,10 +113,13 @@ pub(super) fn most_probable(
     let sizes: Vec<f64> = (0..first.sizes.len()).map(size).collect();
     let instead = is_held.then(|| extended.free_instead(cause, &sizes, rows)).flatten();
     let (instead, widened) = if let Some((label, widened)) = instead {
-        (Some(label), widened)
+        (Some(label), widened.into_iter().map(|moved| vec![moved]).collect())
     } else {
-        let moved = cause.columns.iter().copied().zip(sizes);
-        (None, moved.filter(|(k, _)| *k < extended.declared).collect())
+        let is_free = |(k, _): &(usize, f64)| *k < extended.declared;
+        let moved = cause.terms.iter().zip(sizes).map(|(terms, size)| -> Vec<(usize, f64)> {
+            terms.iter().map(|&(k, factor)| (k, factor * size)).filter(is_free).collect()
+        });
+        (None, moved.filter(|moved| !moved.is_empty()).collect())
     };
     // A misfit that no cause explains looks like noise.
     let label = match cause.kind {

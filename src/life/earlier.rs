@@ -170,11 +170,16 @@ impl Earlier {
         }
     }
 
-    /// Adds variance to the deviation of the parameter with an index in the model. Does nothing if
-    /// the Gaussian does not contain the parameter.
-    pub fn widen(&mut self, parameter: usize, variance: f64) {
-        if let Some(place) = self.place_of(parameter) {
-            self.covariance[(place, place)] += variance;
+    /// Adds the covariance s² v vᵀ of a change of several parameters together, s = `sigmas`. `moved`
+    /// holds the index in the model of each parameter and its change v; those that the Gaussian does
+    /// not contain are left out.
+    pub fn widen(&mut self, moved: &[(usize, f64)], sigmas: f64) {
+        let placed = |&(k, change): &(usize, f64)| Some((self.place_of(k)?, sigmas * change));
+        let placed: Vec<(usize, f64)> = moved.iter().filter_map(placed).collect();
+        for (i, change) in &placed {
+            for (j, other) in &placed {
+                self.covariance[(*i, *j)] += change * other;
+            }
         }
     }
 }

@@ -41,7 +41,10 @@ pub enum PriorError {
         file.display()
     )]
     Changed { file: PathBuf },
-    #[error("{}: not a PRIOR.toml of flexcal fleet: {reason}", file.display())]
+    #[error(
+        "{}: not a PRIOR.toml of flexcal fleet: {reason}; --prior takes that or the estimate.json of flexcal identify",
+        file.display()
+    )]
     Syntax { file: PathBuf, reason: String },
     #[error("{}: {part} is declared differently in the problem; a prior is of arms with the same declaration", file.display())]
     OtherPart { file: PathBuf, part: String },

@@ -92,6 +92,9 @@ impl FleetPrior {
         let bytes = read_limited(file, MAX_FILE_MIB << 20)
             .map_err(|source| PriorError::Unreadable { file: file.to_owned(), source })?;
         let text = String::from_utf8(bytes).map_err(|error| syntax(error.to_string()))?;
+        if text.lines().any(|line| line.trim() == "[[joint]]") {
+            return Err(syntax("it declares joints, as a problem.toml does".to_owned()));
+        }
         let Document { format, version, problem, arm_parts, parameters } =
             toml::from_str(&text).map_err(|error| syntax(error.message().to_owned()))?;
         if format != FORMAT || version > VERSION {

@@ -15,6 +15,7 @@ use super::earlier::Earlier;
 use super::error::PriorError;
 use super::evidence::factor;
 use super::fleet_file::FleetPrior;
+use super::pairs::with_pairs;
 use super::relocation::{self, MIN_RELOCATION_NATS, Placed};
 use super::rows::{SensitiveRows, warmth};
 use crate::fit::{
@@ -45,7 +46,7 @@ const MIN_LEARNED: f64 = 1e-3;
 const BOUND_SIGMAS: f64 = 3.0;
 /// Standard deviation (1 σ) assumed for the deviation of a parameter without any prior: \[m\],
 /// \[rad\], or of a logarithm.
-const WIDE_SIGMA: f64 = 1.0;
+pub(super) const WIDE_SIGMA: f64 = 1.0;
 
 /// Source of the prior of an identification.
 #[derive(Debug, Clone)]
@@ -177,11 +178,12 @@ pub(super) fn identified(
             let names = placed.parameters.iter().map(|&k| model.parameters[k].name.clone());
             since.replaced.extend(names);
         }
-        for &(parameter, size) in &cause.widened {
-            let variance = (WIDENING * size).powi(2);
-            prior.widen(parameter, variance);
-            let name = model.parameters[parameter].name.clone();
-            *since.variances.entry(name).or_insert(0.0) += variance;
+        for moved in &cause.widened {
+            prior.widen(moved, WIDENING);
+            for (parameter, size) in moved {
+                let name = model.parameters[*parameter].name.clone();
+                *since.variances.entry(name).or_insert(0.0) += (WIDENING * size).powi(2);
+            }
         }
         if let Some(ratio) = cause.noise_ratio {
             since.noise_ratio *= ratio;
@@ -259,8 +261,9 @@ fn contradiction(
     let misfit = 1.0 - (declared / found.sigma).powi(2);
     let misfit = misfit * sensitive.coordinates.iter().sum::<usize>() as f64;
     let warmed = warmth.as_ref().map(|_| (&*causes, misfit));
-    let covariance = covariance(&extended, prior, &sensitive, warmed);
-    let assessed = assess(&sensitive, &factor(&covariance), &causes, false);
+    let uncertainty = factor(&covariance(&extended, prior, &sensitive, warmed));
+    let assessed = assess(&sensitive, &uncertainty, &causes, false)
+        .and_then(|assessed| paired(assessed, &sensitive, &uncertainty, &mut causes));
     let Some(assessed) = assessed else { return (None, None) };
     let chi2 = chi2_of_rows(&assessed);
     let evidence = contradicting_evidence(&assessed);
@@ -319,7 +322,21 @@ fn contradiction(
 /// estimate.
 fn contradicting_evidence(assessed: &Assessment) -> Option<f64> {
     let (_, evidence) = *assessed.looks.last()?;
-    (evidence > CONTRADICTION_RATIO.ln()).then_some(evidence)
+    (evidence > CONTRADICTION_RATIO.ln()).then_some(evidence.max(assessed.ln_sum))
+}
+
+/// Returns the assessment with pairs of causes if the rows contradict the earlier estimate, and
+/// unchanged otherwise; `None` if a number is not finite.
+fn paired(
+    assessed: Assessment,
+    rows: &SensitiveRows,
+    factor: &DMatrix<f64>,
+    causes: &mut Vec<Cause>,
+) -> Option<Assessment> {
+    if contradicting_evidence(&assessed).is_none() {
+        return Some(assessed);
+    }
+    with_pairs(assessed, rows, factor, causes)
 }
 
 /// Returns χ² of all rows under "unchanged", its degrees of freedom and its p-value.
@@ -464,5 +481,6 @@ fn tested(
     let mut factor = DMatrix::zeros(rows.sensitivity.ncols(), residual.len());
     factor.rows_mut(first, residual.len()).copy_from(&lower);
     let assessed = assess(&rows, &factor, &causes, false)?;
+    let assessed = paired(assessed, &rows, &factor, &mut causes)?;
     Some(CorrectedTest { assessed, causes, extended, rows, places })
 }

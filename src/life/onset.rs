@@ -15,18 +15,18 @@ const MAX_ONSETS: usize = 24;
 /// table is thus no change.
 const MIN_CHANGED_ROWS: usize = 3;
 
-/// Adds the hypotheses that a cause acts only from a later row on. Returns the causes with the most
-/// probable onset of each, the most probable cause first.
+/// Adds the hypotheses that a cause acts only from a later row on. The causes of the assessment then
+/// have the most probable onset of each, the most probable cause first.
 ///
 /// The probability of a cause is the sum over all its onsets. Noise and gross rows have no onsets.
 /// The evidence for a change, and with it the rate of false alarms, does not depend on onsets.
 /// Returns `None` if a number is not finite.
 pub(super) fn with_onsets(
-    assessment: &Assessment,
+    assessment: Assessment,
     rows: &SensitiveRows,
     factor: &DMatrix<f64>,
     causes: &[Cause],
-) -> Option<Vec<AssessedCause>> {
+) -> Option<Assessment> {
     let last = (rows.len() + 1).saturating_sub(MIN_CHANGED_ROWS);
     let step = last.saturating_sub(1).div_ceil(MAX_ONSETS).max(1);
     let onsets: Vec<usize> = (1..last).step_by(step).collect();
@@ -65,7 +65,7 @@ pub(super) fn with_onsets(
         })
         .collect();
     found.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    Some(found)
+    Some(Assessment { causes: found, ln_sum: assessment.ln_sum + all, ..assessment })
 }
 
 /// Returns the sums over all rows, for the assumed noise.

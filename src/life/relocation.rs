@@ -5,6 +5,7 @@
 
 use nalgebra::{DVector, Rotation3, Vector3};
 
+use super::evidence::SECOND_CHANGE_ODDS;
 use super::rows::SensitiveRows;
 use crate::fit::register;
 use crate::model::parameter::{Parameter, ParameterSite};
@@ -13,6 +14,12 @@ use crate::model::{Model, Pose};
 /// Evidence \[nats\] by which a placement that is located anew must exceed all small changes
 /// together: each of its six coordinates is located to about 1 % of the range of plausible moves.
 pub(super) const MIN_RELOCATION_NATS: f64 = 28.0;
+/// Largest ratio of the errors after a base, camera or marker is located anew to those before at which it
+/// counts as moved, though the rows show another change too.
+const MAX_REGISTERED_ERROR: f64 = 0.05;
+/// Largest root mean square error after it is located anew, in units of the noise, at which it
+/// counts as moved beside another change: more than that is read wrongly.
+const MAX_REGISTERED_SIGMAS: f64 = 100.0;
 /// Maximum number of steps of the fit of a pose.
 const MAX_STEPS: usize = 60;
 /// Relative reduction of the cost below which the fit of a pose ends.
@@ -138,4 +145,36 @@ pub(super) fn located_anew(
         }
     }
     Some(x)
+}
+
+/// Rows after a base, camera or marker has been located anew.
+pub(super) struct LocatedAnew {
+    /// χ² of the rows, and ln of the evidence for another change.
+    pub chi2: f64,
+    pub evidence: f64,
+    /// Number of measured coordinates.
+    pub coordinates: f64,
+    /// Lengths of the whitened residuals before and after.
+    pub residuals: [f64; 2],
+}
+
+impl LocatedAnew {
+    /// Returns the probability of the move, and the gain by it alone \[nats\]: half of the decrease of
+    /// χ², less that of its coordinates. `None` unless the move explains the rows: there is no
+    /// evidence above `threshold` for another change, or the errors are a small fraction of those
+    /// before, so that this has moved whatever else changed, and both changes explain the rows
+    /// better than all small ones. `small` holds χ² of the unchanged arm and ln of the evidence for
+    /// these.
+    pub fn weighed(&self, threshold: f64, small: (f64, f64)) -> Option<(f64, f64)> {
+        let &Self { chi2, evidence, coordinates, residuals: [before, after] } = self;
+        let gain = 0.5 * (small.0 - chi2) - MIN_RELOCATION_NATS;
+        if evidence < threshold {
+            return Some((1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp()), gain));
+        }
+        let largest = MAX_REGISTERED_SIGMAS * coordinates.sqrt();
+        // ln of the odds of the move with another change, against all small changes together.
+        let odds = gain + evidence + SECOND_CHANGE_ODDS.ln() - small.1;
+        let is_small = after <= largest.min(MAX_REGISTERED_ERROR * before);
+        (is_small && odds > 0.0).then(|| (1.0 / (1.0 + (-odds).exp()), gain))
+    }
 }

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::assessment::AssessedCause;
 use super::causes::{Cause, CauseKind};
 use super::evidence::Unchanged;
+use super::identify::WIDE_SIGMA;
 use super::onset::{padded_factor, sums_of};
 use super::rows::SensitiveRows;
 use crate::quantity::Unit;
@@ -45,6 +46,28 @@ pub struct WatchedCause {
     pub poses_to_tell_apart: Option<usize>,
 }
 
+impl WatchedCause {
+    /// Returns the cause that the table is misread if its rows, read in another way, have a smaller
+    /// error than with the most probable of `causes`; else these causes. `misread` describes the
+    /// other way, with its error.
+    pub(super) fn or_misread(causes: Vec<Self>, misread: Option<(String, f64)>) -> Vec<Self> {
+        let left = causes.first().and_then(|cause| cause.left_out_error).unwrap_or(f64::INFINITY);
+        let Some((label, error)) = misread.filter(|(_, error)| *error < left) else {
+            return causes;
+        };
+        vec![Self {
+            kind: CauseKind::Misread,
+            label,
+            row: None,
+            from_row: None,
+            probability: 1.0,
+            changes: Vec::new(),
+            left_out_error: Some(error),
+            poses_to_tell_apart: None,
+        }]
+    }
+}
+
 /// Change of one parameter since the estimate.
 #[derive(Debug, Clone)]
 pub struct Change {
@@ -62,7 +85,12 @@ pub struct Change {
 /// Rows and causes from which the report of a cause is computed.
 pub(super) struct Reporter<'a> {
     pub rows: &'a SensitiveRows,
+    /// Matrix F with F Fᵀ the covariance of the estimate.
     pub factor: &'a DMatrix<f64>,
+    /// The same without drift.
+    pub undrifted: &'a DMatrix<f64>,
+    /// Columns of bases and targets that the estimate does not know, such as those of a new session.
+    pub unknown: &'a [usize],
     pub causes: &'a [Cause],
     /// True for rows of the leading kind (positions, if there are any), whose errors are reported.
     pub leads: &'a [bool],
@@ -125,12 +153,35 @@ impl Reporter<'_> {
         (chosen.iter().map(square).sum::<f64>() / chosen.len().max(1) as f64).sqrt()
     }
 
+    /// Returns the factor of the covariance without drift and without the variance of what the
+    /// estimate does not know.
+    fn known_factor(&self) -> DMatrix<f64> {
+        let mut known = self.undrifted.clone();
+        self.unknown.iter().for_each(|&k| known.row_mut(k).fill(0.0));
+        known
+    }
+
+    /// Returns the root mean square error of the rows of the leading kind that noise, the known
+    /// misfit and the uncertainty of the estimate without drift give \[m\] or \[rad\].
+    pub fn expected_error(&self) -> f64 {
+        let known = self.known_factor();
+        self.rms(|row| self.rows.expected_errors(row, &known))
+    }
+
     /// Returns the root mean square error of the rows of the leading kind (positions, if there are
     /// any), each predicted with the changes of the cause as estimated without the row's group.
     /// `None` if a number is not finite.
     fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
-        let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
-        let (rows, factor) = (&rows, padded_factor(self.factor, columns.len()));
+        let (rows, mut columns) = self.rows.masked_before(assessed.onset, &cause.columns);
+        // What the estimate does not know, and its uncertainty, are estimated together with the
+        // cause, because errors of the estimate may compensate each other.
+        let known = self.known_factor();
+        let (rows, carried) = &rows.with_columns(&(self.rows.columns(&known) * &known));
+        columns.extend(self.unknown);
+        columns.extend(carried.clone());
+        let unknown = vec![WIDE_SIGMA; self.unknown.len()];
+        let sizes = [&*assessed.sizes, &unknown, &vec![1.0; carried.len()]].concat();
+        let factor = DMatrix::zeros(rows.sensitivity.ncols(), 1);
         let sums = sums_of(rows);
         let groups = rows.len().min(MAX_GROUPS);
         let means: Option<Vec<DVector<f64>>> = (0..groups)
@@ -138,7 +189,7 @@ impl Reporter<'_> {
                 let mut others = sums.clone();
                 (group..rows.len()).step_by(groups).for_each(|row| others.add(rows, row, -1.0));
                 let unchanged = Unchanged::new(&others, &factor)?;
-                Some(unchanged.likelihood_ratio(&columns, &assessed.sizes)?.1)
+                Some(unchanged.likelihood_ratio(&columns, &sizes)?.1)
             })
             .collect();
         let means = means?;

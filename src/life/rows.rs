@@ -93,6 +93,16 @@ impl SensitiveRows {
         self.sigma[row] * misfit.hypot(1.0)
     }
 
+    /// Returns 1 σ of each measured coordinate of a row in units of its noise: noise, misfit, and the
+    /// uncertainty of an estimate with the covariance F Fᵀ, F = `factor`.
+    pub fn expected_errors(&self, row: usize, factor: &DMatrix<f64>) -> DVector<f64> {
+        let of_estimate = self.of_row(row).columns(0, factor.nrows()) * factor;
+        DVector::from_fn(self.coordinates[row], |coordinate, _| {
+            let misfit = self.misfit_of(row, coordinate).map_or(0.0, |(_, sigma)| sigma);
+            of_estimate.row(coordinate).norm().hypot(misfit).hypot(1.0)
+        })
+    }
+
     /// Returns the configuration of a row and the 1 σ of the misfit of one of its coordinates, in
     /// units of the noise; `None` without a misfit.
     fn misfit_of(&self, row: usize, coordinate: usize) -> Option<(usize, f64)> {
@@ -162,6 +172,20 @@ impl SensitiveRows {
             target.rows_mut(changed.start, changed.len()).copy_from(&copied);
         }
         (masked, (before..before + added).collect())
+    }
+
+    /// Returns the sensitivities to the first parameters, as many as `factor` has rows.
+    pub fn columns(&self, factor: &DMatrix<f64>) -> DMatrix<f64> {
+        self.sensitivity.columns(0, factor.nrows()).into_owned()
+    }
+
+    /// Returns the rows with `added` columns appended, and their indices.
+    pub fn with_columns(&self, added: &DMatrix<f64>) -> (Self, Vec<usize>) {
+        let (before, mut extended) = (self.sensitivity.ncols(), self.clone());
+        let after = before + added.ncols();
+        extended.sensitivity = extended.sensitivity.resize_horizontally(after, 0.0);
+        extended.sensitivity.columns_mut(before, added.ncols()).copy_from(added);
+        (extended, (before..after).collect())
     }
 
     /// Returns the sum over all residuals of the variance of the shared misfit, in units of the

@@ -3,14 +3,16 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-use super::assessment::{AssessedCause, assess};
+use super::assessment::{AssessedCause, Assessment, assess};
 use super::causes::{Cause, CauseKind, Extended};
-use super::earlier::{EQUAL_SIGMA, Earlier};
+use super::earlier::Earlier;
 use super::error::PriorError;
 use super::evidence::factor;
 use super::identify::covariance;
+use super::known_noise::KnownNoise;
 use super::onset::with_onsets;
-use super::relocation::{self, MIN_RELOCATION_NATS, Placed};
+use super::pairs::with_pairs;
+use super::relocation::{self, LocatedAnew, Placed};
 use super::reporter::{Change, MIN_NAMED_PROBABILITY, Reporter, WatchedCause};
 use super::rows::{SensitiveRows, SharedMisfit, warmth};
 use crate::error::InputErrorKind;
@@ -30,15 +32,10 @@ const MIN_REPORTED_PROBABILITY: f64 = 0.005;
 /// p-value of χ² below which noise and the known misfit, with drift if there is any, do not explain
 /// the rows.
 pub(crate) const MIN_EXPECTED_P: f64 = 0.01;
-/// Largest ratio of the errors after a base is registered to those before at which the base counts
-/// as moved, though the rows show another change too.
-const MAX_REGISTERED_ERROR: f64 = 0.05;
-/// Largest root mean square error after a base is registered, in units of the noise, at which the
-/// base counts as moved beside another change: more than that is read wrongly.
-const MAX_REGISTERED_SIGMAS: f64 = 100.0;
-/// Prior odds that something else changed together with a placement (a base, camera or marker),
-/// against the placement alone.
-const SECOND_CHANGE_ODDS: f64 = 0.05;
+/// Smallest ratio of the error that a named cause leaves to the expected one at which the cause is
+/// not the whole change: four times the variance, which nine coordinates reach by chance in less
+/// than 0.01 %.
+const MIN_UNEXPLAINED_RATIO: f64 = 2.0;
 /// Smallest number of measured positions that determine a moved base and test the fit.
 const MIN_BASE_ROWS: usize = 4;
 /// Smallest ratio of the two largest principal variances of points that are not on a line.
@@ -76,6 +73,9 @@ pub struct Watch {
     /// Root mean square error with which the estimate predicts the rows of the leading kind \[m\]
     /// or \[rad\].
     pub error: f64,
+    /// Root mean square error of these rows that noise, the known misfit and the uncertainty of the
+    /// estimate without drift give \[m\] or \[rad\].
+    pub expected_error: f64,
     /// Unit of the errors: that of the leading kind of rows.
     pub unit: Unit,
     /// Standard deviation (1 σ) of a coordinate of the first row of the leading kind, noise and
@@ -107,6 +107,13 @@ impl Watch {
                 && cause.left_out_error.is_none_or(|left| left < self.error)
         };
         self.causes.first().filter(|_| self.is_changed()).filter(is_named)
+    }
+
+    /// Returns the error of left-out rows with the named cause updated \[m\] or \[rad\], if it is so
+    /// much larger than expected that something else has changed or drifted as well.
+    pub fn unexplained_error(&self) -> Option<f64> {
+        let left = self.named()?.left_out_error?;
+        (left > MIN_UNEXPLAINED_RATIO * self.expected_error).then_some(left)
     }
 }
 
@@ -160,22 +167,27 @@ pub fn watch(
         every_row.iter().map(|&row| kept.observation(row).kind() == leading.kind()).collect();
     let tested = TestedRows { problem, model: &model, placement: &placement, kept: &kept, misfit };
     let not_finite = || PriorError::NotFinite { file: estimate.file.clone() };
-    let at_estimate = tested.linearised(&poses, &x, &earlier);
+    let mut at_estimate = tested.linearised(&poses, &x, &earlier);
     let mut assessed = assess(&at_estimate.rows, &at_estimate.factor, &at_estimate.causes, true)
         .ok_or_else(not_finite)?;
     let threshold = -false_alarm_rate.ln();
     let changed_at = assessed.looks.iter().find(|look| look.1 >= threshold).map(|look| look.0);
+    let mut is_unexplained = false;
     if changed_at.is_some() {
-        let Linearised { rows, factor, causes, .. } = &at_estimate;
-        assessed.causes = with_onsets(&assessed, rows, factor, causes).ok_or_else(not_finite)?;
+        let Linearised { rows, factor, causes, .. } = &mut at_estimate;
+        let single = with_onsets(assessed, rows, factor, causes).ok_or_else(not_finite)?;
+        let first = single.causes.first();
+        is_unexplained = first.is_some_and(|of| causes[of.cause].kind == CauseKind::Other);
+        assessed = with_pairs(single, rows, factor, causes).ok_or_else(not_finite)?;
     }
     let undrifted = (days > 0.0).then(|| Earlier::of_estimate(estimate, problem, &model, 0.0));
-    let undrifted = undrifted.transpose()?.and_then(|earlier| {
-        let Linearised { rows, factor, .. } = tested.linearised(&poses, &x, &earlier);
-        let assessed = assess(&rows, &factor, &[], false)?;
+    let undrifted = undrifted.transpose()?.map(|earlier| tested.linearised(&poses, &x, &earlier));
+    let p_without_drift = undrifted.as_ref().and_then(|Linearised { rows, factor, .. }| {
+        let assessed = assess(rows, factor, &[], false)?;
         Some(p_value(assessed.chi2, assessed.coordinates))
     });
-    let report = at_estimate.reporter(&leads);
+    let undrifted = &undrifted.as_ref().unwrap_or(&at_estimate).factor;
+    let report = at_estimate.reporter(&leads, undrifted);
     let reported: Vec<&AssessedCause> = assessed
         .causes
         .iter()
@@ -193,14 +205,15 @@ pub fn watch(
             ..report.cause(reported[k], reported.get(usize::from(k == 0)).copied())
         })
         .collect();
-    let is_unexplained = watched.first().is_some_and(|cause| cause.kind == CauseKind::Other);
     if changed_at.is_some() {
         let at = (&*poses, &x);
-        let linear = (assessed.chi2, assessed.looks.last().map_or(0.0, |look| look.1));
+        let evidence = assessed.looks.last().map_or(0.0, |look| look.1.max(assessed.ln_sum));
+        let linear = (assessed.chi2, evidence);
         let moved = tested.moved_fixture(at, (&earlier, &leads), threshold, linear);
         let base = || tested.moved_base(at, (&earlier, &leads), threshold, linear);
         let moved = moved.or_else(|| base().filter(|_| is_unexplained));
-        watched = moved.unwrap_or(watched);
+        let misread = fit::misread_table(problem, (&model, &x), &kept);
+        watched = WatchedCause::or_misread(moved.unwrap_or(watched), misread);
     }
     state_turns(&model, &x, &mut watched);
     Ok(Watch {
@@ -213,8 +226,9 @@ pub fn watch(
         changed_at,
         chi2: (assessed.chi2, assessed.coordinates, p_value(assessed.chi2, assessed.coordinates)),
         days,
-        p_without_drift: undrifted,
+        p_without_drift,
         error: report.rms(|row| at_estimate.rows.residual_of(row)),
+        expected_error: report.expected_error(),
         unit: kind_named(leading.kind()).unit,
         sigma: leads
             .iter()
@@ -264,12 +278,16 @@ struct Linearised {
     causes: Vec<Cause>,
     /// Matrix F with F Fᵀ the covariance of the estimate.
     factor: DMatrix<f64>,
+    /// Columns of bases and targets that the estimate does not know.
+    unknown: Vec<usize>,
 }
 
 impl Linearised {
-    /// Returns the reporter of these causes; `leads` is true for rows of the leading kind.
-    fn reporter<'a>(&'a self, leads: &'a [bool]) -> Reporter<'a> {
-        Reporter { rows: &self.rows, factor: &self.factor, causes: &self.causes, leads }
+    /// Returns the reporter of these causes; `leads` is true for rows of the leading kind, and
+    /// `undrifted` is the factor of the covariance without drift.
+    fn reporter<'a>(&'a self, leads: &'a [bool], undrifted: &'a DMatrix<f64>) -> Reporter<'a> {
+        let Self { rows, factor, unknown, causes, .. } = self;
+        Reporter { rows, factor, undrifted, unknown, causes, leads }
     }
 }
 
@@ -291,7 +309,28 @@ impl TestedRows<'_> {
         let causes = extended.causes(problem, &mut rows, warmth.as_deref());
         let warmed = warmth.as_ref().map(|_| (&*causes, rows.sum_of_misfit_variances()));
         let factor = factor(&covariance(&extended, earlier, &rows, warmed));
-        Linearised { extended, rows, causes, factor }
+        let is_unknown =
+            |k: &usize| earlier.place_of(*k).is_none() && model.parameters[*k].site.is_placement();
+        let unknown = (0..extended.declared).filter(is_unknown).collect();
+        Linearised { extended, rows, causes, factor, unknown }
+    }
+
+    /// Returns the rows as they are `at_place`, after something has been located anew, beside those at
+    /// the full parameter vector `x`. `assessed` is the test of the rows there.
+    fn of_place(
+        &self,
+        poses: &[Pose],
+        x: &DVector<f64>,
+        at_place: &Linearised,
+        assessed: &Assessment,
+    ) -> LocatedAnew {
+        let before = SensitiveRows::new(self.model, poses.to_vec(), x).residual.norm();
+        LocatedAnew {
+            chi2: assessed.chi2,
+            evidence: assessed.looks.last().map_or(0.0, |look| look.1),
+            coordinates: assessed.coordinates,
+            residuals: [before, at_place.rows.residual.norm()],
+        }
     }
 
     /// Returns the move of a camera or marker as the cause, if the rows are as expected once its
@@ -310,17 +349,18 @@ impl TestedRows<'_> {
             let located = relocation::located_anew(self.model, poses, x, placed)?;
             let at_place = self.linearised(poses, &located, earlier);
             let assessed = assess(&at_place.rows, &at_place.factor, &at_place.causes, false)?;
-            let (_, evidence) = *assessed.looks.last()?;
-            let gain = 0.5 * (chi2 - assessed.chi2) - MIN_RELOCATION_NATS;
             let is_moved =
                 |cause: &&AssessedCause| at_place.causes[cause.cause].columns == placed.parameters;
             let moved = assessed.causes.iter().find(is_moved)?;
-            let is_explained = gain > linear && evidence < threshold;
-            let mut watched = at_place.reporter(leads).cause(moved, None);
+            let of_place = self.of_place(poses, x, &at_place, &assessed);
+            let (probability, gain) = of_place.weighed(threshold, (chi2, linear))?;
+            // A single change of the place is compared with the small changes by χ² alone.
+            let is_explained = of_place.evidence >= threshold || gain > linear;
+            let mut watched = at_place.reporter(leads, &at_place.factor).cause(moved, None);
             for (change, &k) in watched.changes.iter_mut().zip(&placed.parameters) {
                 change.change += at_place.extended.x[k] - x[k];
             }
-            watched.probability = 1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp());
+            watched.probability = probability;
             is_explained.then_some((gain, watched))
         });
         tried.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, watched)| vec![watched])
@@ -361,27 +401,15 @@ impl TestedRows<'_> {
         }
         let at_base = self.linearised(poses, &registered, earlier);
         let assessed = assess(&at_base.rows, &at_base.factor, &at_base.causes, false)?;
-        let (_, evidence) = *assessed.looks.last()?;
         let is_base = |cause: &&AssessedCause| at_base.causes[cause.cause].kind == CauseKind::Base;
         let base = assessed.causes.iter().find(is_base)?;
-        let is_alone = evidence < threshold;
-        let before = SensitiveRows::new(self.model, poses.to_vec(), x).residual.norm();
-        let after = at_base.rows.residual.norm();
-        let largest = MAX_REGISTERED_SIGMAS * assessed.coordinates.sqrt();
-        // ln of the odds of the base with another change, against all small changes together.
-        let both = evidence + SECOND_CHANGE_ODDS.ln();
-        let gain = 0.5 * (chi2 - assessed.chi2) - MIN_RELOCATION_NATS + both - linear;
-        let is_small = after <= largest.min(MAX_REGISTERED_ERROR * before);
-        (is_alone || is_small && gain > 0.0).then_some(())?;
-        let mut watched = at_base.reporter(leads).cause(base, None);
+        let of_place = self.of_place(poses, x, &at_base, &assessed);
+        let (probability, _) = of_place.weighed(threshold, (chi2, linear))?;
+        let mut watched = at_base.reporter(leads, &at_base.factor).cause(base, None);
         for (change, &k) in watched.changes.iter_mut().zip(&at_base.causes[base.cause].columns) {
             change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);
         }
-        watched.probability = if is_alone {
-            1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp())
-        } else {
-            1.0 / (1.0 + (-gain).exp())
-        };
+        watched.probability = probability;
         let frame = |x: &DVector<f64>| model.base_frames(x.as_slice()).into_iter().next();
         let angle = turn_about_first_joint(self.problem, &frame(x)?, &frame(&registered)?);
         let Some(angle) = angle else { return Some(vec![watched]) };
@@ -440,66 +468,4 @@ fn has_positions(measurements: &Measurements) -> bool {
 /// Returns the p-value of χ² with `coordinates` degrees of freedom.
 fn p_value(chi2: f64, coordinates: f64) -> f64 {
     ChiSquared::new(coordinates).map_or(f64::NAN, |distribution| distribution.sf(chi2))
-}
-
-/// Number of standard errors by which the variance of prediction errors must exceed the declared
-/// noise variance to count as misfit.
-const MIN_EXCESS_ERRORS: f64 = 2.0;
-
-/// Noise of new rows, and the misfit that the earlier fit found beyond it.
-struct KnownNoise {
-    /// Standard deviation (1 σ) of the noise of a position's coordinate in rows that state none
-    /// \[m\]; `None` if neither problem nor estimate states it.
-    pub sigma: Option<f64>,
-    /// Standard deviation (1 σ) of the misfit of a position's coordinate \[m\].
-    misfit: f64,
-    /// Standard deviation (1 σ) of the misfit of other coordinates, in units of their noise.
-    other_misfit: f64,
-}
-
-impl KnownNoise {
-    /// Returns the declared noise, or else that of the earlier fit, and the misfit beyond it. The
-    /// misfit is the excess of the larger of two: the σ that the earlier fit took, and the noise of
-    /// its predictions if that is significantly larger than the declared one.
-    pub fn of(problem: &Problem, estimate: &SavedEstimate) -> Self {
-        let saved = &estimate.posterior;
-        let declared = problem.data.position_sigma.or(estimate.estimated_sigma);
-        // For rows that state their σ, the noise is the σ that the fit took without its misfit.
-        let of_rows = |taken: f64| taken / saved.noise_factor.max(1.0).sqrt();
-        let sigma = declared.or(saved.sigma_taken.map(of_rows));
-        let of_predictions = |sigma: f64| {
-            let text = estimate.prediction.as_ref()?;
-            let prediction: serde_json::Value = serde_json::from_str(text).ok()?;
-            let number = |key: &str| prediction.get(key)?.as_f64();
-            let noise = number("noise_m")?.hypot(number("configuration_noise_m")?);
-            // Relative standard error of the variance, estimated from about half the coordinates.
-            let configurations = prediction.get("scores")?.get("configurations")?.as_f64()?;
-            let scatter = (2.0 / (1.5 * configurations).max(1.0)).sqrt();
-            Some(noise).filter(|noise| (noise / sigma).powi(2) > 1.0 + MIN_EXCESS_ERRORS * scatter)
-        };
-        let misfit = sigma.map_or(0.0, |sigma| {
-            let taken = saved.sigma_taken.filter(|taken| *taken > sigma * (1.0 + EQUAL_SIGMA));
-            let largest = taken.unwrap_or(0.0).max(of_predictions(sigma).unwrap_or(0.0));
-            (largest * largest - sigma * sigma).max(0.0).sqrt()
-        });
-        let excess = saved.noise_factor - 1.0;
-        let other_misfit = if excess > EQUAL_SIGMA { excess.sqrt() } else { 0.0 };
-        Self { sigma, misfit, other_misfit }
-    }
-
-    /// Returns 1 σ of the misfit of each coordinate of each pose in units of its noise; `None`
-    /// without a misfit.
-    pub fn misfit_of(&self, poses: &[Pose]) -> Option<Vec<Vec<f64>>> {
-        if self.misfit == 0.0 && self.other_misfit == 0.0 {
-            return None;
-        }
-        let of_pose = |pose: &Pose| {
-            let is_position = pose.observation.is_position();
-            let first = if is_position { self.misfit / pose.sigma } else { self.other_misfit };
-            let mut misfit = vec![first; pose.observation.coordinates()];
-            misfit.resize(pose.coordinates(), self.other_misfit);
-            misfit
-        };
-        Some(poses.iter().map(of_pose).collect())
-    }
 }

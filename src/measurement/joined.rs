@@ -15,6 +15,7 @@ use super::time::shown;
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Dialect, JoinRule, JointLog, Problem};
 use crate::quantity::Unit;
+use crate::quantity::format::two_digits;
 
 /// Maximum number of measured rows without a partner that a warning lists.
 const MAX_LISTED_ROWS: usize = 10;
@@ -108,8 +109,13 @@ impl JoinedLog {
         let dialect = &problem.data.dialect;
         let mut joined = Self { rule: log.by, location: log.location.clone(), ..Self::default() };
         for file in &log.files {
-            let kind = InputErrorKind::DataFileMissing { path: file.clone() };
-            let missing = || log.location.clone().error(kind);
+            let missing = || match log.is_given {
+                true => Location::file(file).error(InputErrorKind::GivenFileMissing),
+                false => {
+                    let kind = InputErrorKind::DataFileMissing { path: file.clone() };
+                    log.location.clone().error(kind)
+                }
+            };
             joined.read_file(Table::open(file, dialect, missing)?, dialect)?;
         }
         let mut by_time: Vec<usize> = (0..joined.rows.len()).collect();
@@ -294,6 +300,29 @@ impl JoinedLog {
         Some(format!("{:.1} s", gaps.get(gaps.len() / 2)?))
     }
 
+    /// Returns the error that the tolerance is smaller than the usual time between partners. `None`
+    /// unless nearly all rows without a partner are far nearer to a row of the log than its rows to
+    /// each other, which other clocks would hardly give.
+    fn small_tolerance(&self) -> Option<TableErrorKind> {
+        let gaps = self.gaps(true);
+        let most = *gaps.get(gaps.len() * 9 / 10)?;
+        let mut steps: Vec<f64> =
+            self.log_times.iter().zip(self.log_times.iter().skip(1)).map(|(a, b)| b - a).collect();
+        steps.sort_by(f64::total_cmp);
+        let step = *steps.get(steps.len() / 2)?;
+        let digit = 10_f64.powf((2.0 * most).log10().floor());
+        let tolerance = (2.0 * most / digit).ceil() * digit;
+        (gaps.len() >= MIN_CHECKED_ROWS && 10.0 * most < step).then(|| {
+            TableErrorKind::ToleranceTooSmall {
+                left: self.unpaired.len(),
+                rows: self.requested,
+                gap: format!("{} s", two_digits(gaps[gaps.len() / 2], 3)),
+                step: format!("{} s", two_digits(step, 3)),
+                tolerance: two_digits(tolerance, 6),
+            }
+        })
+    }
+
     /// Returns the offset with which the rows of both tables pair best, as the value of `offset_s`;
     /// `None` if the tables are not joined by time or no offset is certain. Paired rows are close to
     /// each other, or within the tolerance of the problem if `is_tolerant`.
@@ -335,6 +364,9 @@ impl JoinedLog {
             && let Some(table) = self.table_without_seconds()
         {
             return error(TableErrorKind::SecondsLost { table });
+        }
+        if let Some(error_kind) = self.small_tolerance().filter(|_| 2 * left > rows) {
+            return error(error_kind);
         }
         if self.paired == 0 && self.requested > 0 {
             let (gap, keys, offset) = (self.gap(), self.keys(), self.offset(true));

@@ -37,14 +37,15 @@ impl<'a> Names<'a> {
         if let Some(error) = rules.iter().find_map(|rule| reversed(rule, table)) {
             return Err(error);
         }
+        // A column of the table says more than the name of its file.
         let of_file = rules.iter().find(|rule| rule.theirs == ColumnSelector::File);
+        let of_file = of_file.filter(|rule| !has(&rule.ours));
         let is_foreign = |rule: &&ColumnRule| match &rule.theirs {
             ColumnSelector::Name(name) => has(name),
             ColumnSelector::Place(_) => !has(&rule.ours),
             ColumnSelector::File => rules.len() == 1,
         };
         if !rules.iter().any(|rule| is_foreign(&rule)) {
-            let of_file = of_file.filter(|rule| !has(&rule.ours));
             let unused = rules.iter().find(|rule| !has(&rule.ours));
             let unused = unused.filter(|rule| rule.theirs != ColumnSelector::File);
             return Ok(Self { of_place, of_file, mapped: false, unused });

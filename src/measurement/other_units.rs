@@ -6,6 +6,7 @@ use super::Measurements;
 use super::limits::Commands;
 use crate::error::{Location, Warning, WarningKind};
 use crate::problem::{Joint, Observation, Problem};
+use crate::quantity::format::about_three_digits;
 
 /// Range of room temperatures, 15 °C to 35 °C, in degrees Fahrenheit.
 const ROOM_FAHRENHEIT: std::ops::RangeInclusive<f64> = 59.0..=95.0;
@@ -54,7 +55,7 @@ impl Measurements {
         let usual = *forces.get(forces.len() / 2)?;
         let ratio = usual * GRAVITY / declared;
         let kind = WarningKind::HoistInKilograms {
-            usual: format!("{usual}"),
+            usual: about_three_digits(usual),
             declared: format!("{declared}"),
         };
         ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then(|| self.warning(0, "hoist_N", kind))

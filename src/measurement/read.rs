@@ -12,7 +12,7 @@ use super::table::Table;
 use super::{ColumnTable, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
 use crate::files::{same_file, was_changed};
-use crate::problem::{JoinRule, Missing, Problem};
+use crate::problem::{JoinRule, JointLog, Missing, Problem};
 
 impl Measurements {
     /// Reads files one after the other; also returns warnings, for example about ignored columns.
@@ -158,12 +158,18 @@ struct Tables<'a> {
     log: Option<JoinedLog>,
 }
 
+/// Returns true if rows of other `files` than those of the problem are paired by their order with the
+/// joint table that the problem names.
+fn is_by_order_with_others(problem: &Problem, files: &[PathBuf]) -> bool {
+    let is_kept = |log: &JointLog| log.by == JoinRule::Order && !log.is_given;
+    problem.data.joint_log.as_ref().is_some_and(is_kept) && files != problem.data.files
+}
+
 impl<'a> Tables<'a> {
     fn new(files: &'a [PathBuf], problem: &'a Problem, table_use: Use) -> Self {
-        let by_order = problem.data.joint_log.as_ref().is_some_and(|log| log.by == JoinRule::Order);
         let joins = match table_use {
             Use::Measured | Use::Judged => true,
-            Use::Predicted => !by_order || files == problem.data.files,
+            Use::Predicted => !is_by_order_with_others(problem, files),
             Use::Planned => false,
         };
         Self {
@@ -193,6 +199,11 @@ impl<'a> Tables<'a> {
                 if let Some(path) = self.files.iter().find(is_both) {
                     let kind = TableErrorKind::JoinedWithItself { path: path.clone() };
                     return Err(declared.location.clone().error(kind));
+                }
+                if is_by_order_with_others(self.problem, self.files) {
+                    let file = declared.files.first().cloned().unwrap_or_default();
+                    let kind = WarningKind::JointTableKept { file };
+                    self.warnings.push(Warning { location: declared.location.clone(), kind });
                 }
                 Some(JoinedLog::read(declared, self.problem)?)
             }

@@ -22,11 +22,16 @@ impl StartTimes {
     }
 }
 
+/// Returns true if a time \[s\] is a date, not one of a clock with its own zero.
+pub(crate) fn is_date(time: f64) -> bool {
+    time >= FIRST_DATE
+}
+
 impl Measurements {
     /// Returns true if times were measured and are dates, not seconds of a clock with its own zero.
     #[doc(hidden)]
     pub fn has_dates(&self) -> bool {
-        self.time_measured && self.time.iter().all(|&time| time >= FIRST_DATE)
+        self.time_measured && self.time.iter().all(|&time| is_date(time))
     }
 
     /// Returns the time of the first pose of each session.

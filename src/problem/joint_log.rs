@@ -17,6 +17,9 @@ pub struct JointLog {
     pub by: JoinRule,
     /// Place in the file, for errors.
     pub location: Location,
+    /// True if the files are given with the measurements, instead of those that the problem names.
+    #[doc(hidden)]
+    pub is_given: bool,
 }
 
 /// Rule that pairs the rows of two tables.
@@ -68,5 +71,5 @@ pub(super) fn read(
     };
     let source = section.word("source", &JointSource::WORDS, &JointSource::EACH)?;
     section.finish()?;
-    Ok((JointLog { files, by, location: item.location() }, source))
+    Ok((JointLog { files, by, location: item.location(), is_given: false }, source))
 }

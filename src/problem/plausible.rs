@@ -7,7 +7,7 @@ use super::section::Section;
 use super::{Body, Effect, Fixture, Joint, JointKind, ParameterRule, Problem};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::observation::FixtureKind;
-use crate::quantity::format::number;
+use crate::quantity::format::{number, two_digits};
 use crate::quantity::unrounded_right_angle;
 
 /// Largest plausible length in the joint table \[m\]. Longer ones are probably in millimetres.
@@ -98,6 +98,9 @@ pub(super) fn form_warning(joints: &[Joint]) -> Option<Warning> {
     })
 }
 
+/// Largest ratio of one mass of an arm without equilibrium to all others together, up to which it
+/// is not doubted.
+const MAX_MASS_RATIO: f64 = 10.0;
 /// Largest plausible mass of one body of an arm \[kg\]. The heaviest industrial arms weigh some
 /// thousands of kilograms in all.
 const MAX_BODY_MASS: f64 = 1000.0;
@@ -217,16 +220,35 @@ impl Problem {
         of_beams.chain(self.joints.iter().map(|joint| Body::total_mass(&joint.bodies))).sum()
     }
 
-    /// Returns the error of a pose without equilibrium with the name of the joint that is probably
-    /// too soft; returns any other error as it is.
+    /// Returns the error of a pose without equilibrium with the name of the mass that is probably
+    /// too heavy, or of the joint that is probably too soft; returns any other error as it is.
     pub(crate) fn with_soft_joint(&self, error: InputError) -> InputError {
         match *error.kind {
             InputErrorKind::NoEquilibrium => {
-                let kind = self.soft_joint_error().unwrap_or(InputErrorKind::NoEquilibrium);
-                error.location.error(kind)
+                let kind = self.heavy_mass_error().or_else(|| self.soft_joint_error());
+                error.location.error(kind.unwrap_or(InputErrorKind::NoEquilibrium))
             }
             kind => error.location.error(kind),
         }
+    }
+
+    /// Returns an error that names the mass that is more than [`MAX_MASS_RATIO`] times as heavy as
+    /// all others together.
+    fn heavy_mass_error(&self) -> Option<InputErrorKind> {
+        let of_joint = |joint: &'_ Joint| {
+            let beam = joint.beam.iter();
+            let carried = beam.clone().flat_map(|beam| &beam.masses).chain(&joint.bodies);
+            let carried = carried.map(|body| (body.name.clone(), body.mass));
+            carried.chain(beam.map(|beam| (beam.name.clone(), beam.mass))).collect::<Vec<_>>()
+        };
+        let masses: Vec<(String, f64)> = self.joints.iter().flat_map(of_joint).collect();
+        let (name, mass) = masses.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let ratio = mass / (self.declared_mass() - mass);
+        (ratio.is_finite() && ratio > MAX_MASS_RATIO).then(|| InputErrorKind::HeavyMass {
+            name: name.clone(),
+            mass: two_digits(*mass, 3),
+            ratio: two_digits(ratio, 0),
+        })
     }
 
     /// Returns an error that names the joint that gravity would turn furthest, if by more than

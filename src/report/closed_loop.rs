@@ -13,7 +13,7 @@ use super::identify::{
     row_counts_fact, why_not_trusted,
 };
 use super::noise::{expected_interval, format_chi2, influential_rows, reservations, residual_fact};
-use super::parameters::{against_priors, parameters};
+use super::parameters::{against_priors, joint_names, parameters};
 use super::remainder::{PredictionAccuracy, why_no_bound};
 use super::render::{Report, report, text};
 use super::residual_tests::{self, other_reduced_chi2};
@@ -80,7 +80,9 @@ pub fn loop_brief(
     // Every cause is listed; only its values are shortened.
     let whole = points(usize::MAX);
     let shown = if whole.lines().count() <= room { whole } else { points(1) };
-    head + &shown + &end
+    let words = head + &shown;
+    let names = joint_names(problem, &words).map(|names| text(&[Block::Text(names)]));
+    words + &names.unwrap_or_default() + &end
 }
 
 /// Returns a found effect as a list item: at most `max_values` values ± 1 σ, probability of its

@@ -270,6 +270,12 @@ fn held_out_sentence(sides: &[Side; 2]) -> Option<String> {
 
 /// States that the two results are of arms with different declarations; `None` if they are not.
 fn declaration_note(a: &SavedEstimate, b: &SavedEstimate) -> Option<String> {
+    if let Some([of_a, of_b]) = a.joint_counts(b) {
+        return Some(format!(
+            "These are two different arms: A has {of_a} joints, B has {of_b}. The differences below \
+             compare parameters that only have the same name."
+        ));
+    }
     let part = a.differing_part(b)?;
     let name = part.name;
     let differs = match part.is_declared {

@@ -11,6 +11,10 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number, or_dash};
 use crate::results::{CommandedJoint, commanded_joints, pose_columns};
 
+/// Largest ratio of the tolerance to the bound that it does not exceed, above which its unit is
+/// doubted.
+const MAX_USUAL_TOLERANCE_RATIO: f64 = 50.0;
+
 /// Returns a choice of poses, with a figure of the error expected after each of them.
 pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story {
     let percent = number(options.level * 100.0, 1);
@@ -161,7 +165,17 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
             } else {
                 String::new()
             };
-            format!("Enough: the bound is below the tolerance of {tolerance} mm.{incomplete}")
+            let bound = next.error.map_or(f64::NAN, |error| error.bound);
+            let ratio = options.tolerance.map_or(0.0, |length| length / bound);
+            let odd = if ratio > MAX_USUAL_TOLERANCE_RATIO {
+                format!(
+                    " The tolerance is {} times that bound: check its unit, mm.",
+                    number(ratio, 0)
+                )
+            } else {
+                String::new()
+            };
+            format!("Enough: the bound is below the tolerance of {tolerance} mm.{odd}{incomplete}")
         }
         (Some(StopReason::GainBelowNoise), Some(tolerance), _) => format!(
             "Further poses gain less than the uncertainty of the error itself, and the bound is above the tolerance of {tolerance} mm: \

@@ -132,6 +132,9 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
             "but χ² is too large: some rows, or one kind of rows, fit badly; -v lists them"
                 .to_owned()
         }
+        _ if found.names_mistake() => {
+            "as a consequence of the mistake that the warnings name".to_owned()
+        }
         _ if !is_larger => "so the declared σ is too large".to_owned(),
         Some(influential) => {
             let cause = match influential.rows.len() {
@@ -298,9 +301,12 @@ pub(super) fn reservations(
         "held-out rows are farther from the prediction than the fit expects, beyond chance"
             .to_owned()
     });
-    // The text of this finding names the rows after the colon.
-    let outliers = found.finding(FindingCode::HeldOutOutliers);
-    let outliers = outliers.and_then(|finding| finding.text.split(": ").next().map(str::to_owned));
+    let outliers = found.finding(FindingCode::HeldOutOutliers).and_then(|finding| {
+        let (rows, of) = (finding.count("rows")?, finding.count("of")?);
+        let of = counted(of, &format!("held-out {}", row_noun(found)));
+        let verb = if rows == 1 { "is" } else { "are" };
+        Some(format!("{rows} of {of} {verb} too far off to be noise"))
+    });
     let changed = found
         .has(FindingCode::RowsChanged)
         .then(|| "something changed between the rows (see the warnings)".to_owned());
@@ -308,7 +314,8 @@ pub(super) fn reservations(
 }
 
 /// States whether the fit is to be trusted, with what contradicts it, the held-out error before and
-/// after it, and how much its residual exceeds the declared noise.
+/// after it, and how much its residual exceeds the declared noise. A fit whose residual cannot
+/// contradict it, because priors decide most of it, is not said to be trusted.
 pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccuracy>) -> String {
     if let Some(reason) = found.first_error() {
         return format!("Not to be trusted: {reason}.");
@@ -321,13 +328,22 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         _ => false,
     };
     let reservations = reservations(found, accuracy);
+    let unjudged = found.finding(FindingCode::PriorsDecide).and_then(|few| {
+        Some(format!(
+            "Not judged, because priors decide most of it ({} for {}, from {})",
+            counted(few.count("coordinates")?, "coordinate"),
+            counted(few.count("parameters")?, "parameter"),
+            counted(few.count("poses")?, "different pose")
+        ))
+    });
     let reserved = if reservations.is_empty() {
         String::new()
     } else {
         format!(", but {}", reservations.join("; "))
     };
     if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
-        return format!("The fit is to be trusted{reserved}.");
+        let judged = unjudged.unwrap_or_else(|| "The fit is to be trusted".to_owned());
+        return format!("{judged}{reserved}.");
     }
     let raised = assumed_sigma_ratio(found);
     let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
@@ -355,8 +371,9 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     } else {
         format!("rises from {from} to {to}")
     };
+    let judged = unjudged.unwrap_or_else(|| format!("Trusted{scope}"));
     format!(
-        "Trusted{scope}{reserved}: the mean {} error {change}{without}.{}",
+        "{judged}{reserved}: the mean {} error {change}{without}.{}",
         test_rows_word(&found.fitted).replace(' ', "-"),
         if is_larger {
             format!(" Not fully explained: the residual{of} is {size}.")

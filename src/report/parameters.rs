@@ -5,7 +5,7 @@ use super::figures::{ACCENT, Drawing, Forest};
 use crate::fit::{ActiveConstraint, Estimate, Identification, PriorSize, open_quantities};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
-use crate::problem::Problem;
+use crate::problem::{JointKind, Problem};
 use crate::quantity::format::{MAX_DECIMALS, decimals, number, or_dash, two_digits};
 use crate::results::{Knowledge, LargestHarmonics};
 
@@ -85,6 +85,31 @@ pub(super) fn parameters<'a>(
         blocks.push(Block::Folded(title, folded, on_paper));
     }
     blocks
+}
+
+/// States the names of those joints that `words` mentions by their numbers, if the numbers mislead: a
+/// fixed joint counts, too, or a name holds another number. `None` if there are none.
+pub(super) fn joint_names(problem: &Problem, words: &str) -> Option<String> {
+    let is_mentioned = |number: usize| {
+        let called = format!("joint {number}");
+        let mut after = words.split(&called).skip(1);
+        after.any(|rest| !rest.starts_with(|next: char| next.is_ascii_digit()))
+    };
+    let named = (1..).zip(&problem.joints).filter(|(_, joint)| !joint.name.is_empty());
+    let named: Vec<(usize, &str, bool)> = named
+        .map(|(number, joint)| (number, joint.name.as_str(), joint.kind == JointKind::Fixed))
+        .collect();
+    let holds_other = |&(number, name, _): &(usize, &str, bool)| {
+        let mut numbers = name.split(|letter: char| !letter.is_ascii_digit());
+        numbers.any(|digits| digits.parse::<usize>().is_ok_and(|found| found != number))
+    };
+    if !named.iter().any(|joint| joint.2 || holds_other(joint)) {
+        return None;
+    }
+    let mentioned = named.iter().filter(|(number, ..)| is_mentioned(*number));
+    let mentioned: Vec<String> =
+        mentioned.map(|(number, name, _)| format!("joint {number} is {name}")).collect();
+    (!mentioned.is_empty()).then(|| format!("In the problem {}.", mentioned.join(", ")))
 }
 
 /// States which row of a standard DH table each parameter belongs to; `None` for other tables.

@@ -49,8 +49,8 @@ pub(super) fn to_declare(
         .any(|untested| reason_untried(problem, untested) == NO_REFERENCE)
     {
         declarations.push(format!(
-            "Declare {} in [data], the temperature at which the arm is as declared. Without it no law of the measured temperatures was \
-             tried.",
+            "Declare {} in [data], the temperature at which the arm is as declared; the mean of the column will do, because fitted parameters make \
+             up for it. Without it no law of the measured temperatures was tried.",
             code("reference_temperature_C")
         ));
     }

@@ -38,6 +38,23 @@ pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> St
         in_unit(watch.error),
         explanation(watch)
     );
+    if let Some(left) = watch.unexplained_error() {
+        let hidden = if watch.days > 0.0 {
+            format!(
+                "; the drift of {} hides what else has changed, which watch without --drift may name",
+                days(watch.days)
+            )
+        } else {
+            String::new()
+        };
+        let _ = write!(
+            head,
+            "\nThis cause is not the whole: with it updated, left-out rows still err by {} rms, where noise, the known misfit and the \
+             uncertainty of the estimate give {}{hidden}",
+            in_unit(left),
+            in_unit(watch.expected_error)
+        );
+    }
     if watch.left_out > 0 {
         let rows = counted(watch.left_out, "row");
         let _ = write!(head, "\n{rows} left out, because the estimate was fitted to them");
@@ -52,7 +69,7 @@ pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> St
     ))]));
     blocks.push(Block::figures([control_chart(watch, rows)]));
     if watch.is_changed() {
-        let rows = watch.causes.iter().map(|cause| row(cause, &in_unit)).collect();
+        let rows = watch.causes.iter().flat_map(|cause| lines(cause, &in_unit)).collect();
         let notes = [
             "probability: among all causes that were tried, given that something changed",
             "error left out: rms of the rows if only this is updated, each row predicted from the others",
@@ -66,7 +83,8 @@ pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> St
 /// Returns a number of days with its noun.
 fn days(days: f64) -> String {
     let noun = if (days - 1.0).abs() < f64::EPSILON { "day" } else { "days" };
-    format!("{} {noun}", number(days, 2))
+    let digits = if days.fract() == 0.0 { 0 } else { 2 };
+    format!("{} {noun}", number(days, digits))
 }
 
 /// Says what explains the errors of rows without a change; empty if the arm has changed.
@@ -130,17 +148,34 @@ fn first_rows(rows: &Measurements) -> Vec<(String, f64)> {
 
 /// States whether the arm has changed, and what has changed.
 fn verdict(watch: &Watch) -> String {
-    let evidence = watch.looks.last().map_or(0.0, |look| look.1.exp());
     let Some(row) = watch.changed_at else {
-        return format!(
-            "No change shown: these rows are {} times as probable if the arm has changed as if it has not; an alarm is raised from {} times on",
-            two_digits(evidence, 4),
-            number(1.0 / watch.false_alarm_rate, 0)
-        );
+        let evidence = watch.looks.last().map_or(0.0, |look| look.1.exp());
+        let alarm = number(1.0 / watch.false_alarm_rate, 0);
+        return if evidence < 1.0 {
+            format!(
+                "No change shown: these rows are {} times as probable without a change as with one",
+                two_digits(evidence.recip(), 4)
+            )
+        } else {
+            format!(
+                "No change shown: the evidence for one is {} to 1, and an alarm takes {alarm} to 1",
+                two_digits(evidence, 4)
+            )
+        };
     };
     let what = match (watch.named(), watch.causes.first()) {
         (Some(cause), _) if cause.kind == CauseKind::Other => {
-            "none of the causes that are tried explains the rows".to_owned()
+            return format!(
+                "The rows do not fit this arm, seen after {}: another arm, or units, signs or columns that are read wrongly, or a change \
+                 that none of the causes tried explains",
+                counted(row, "row")
+            );
+        }
+        (Some(cause), _) if cause.kind == CauseKind::Misread => {
+            return format!(
+                "Not judged: the rows agree with the estimate if they are read in another way, with {}",
+                cause.label
+            );
         }
         (Some(cause), _) => cause.label.clone(),
         (None, Some(cause)) => format!("not certain what; first {}", cause.label),
@@ -149,31 +184,47 @@ fn verdict(watch: &Watch) -> String {
     format!("Changed, seen after {}: {what}", counted(row, "row"))
 }
 
-fn row(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<String> {
+/// Returns the lines of a cause in the table of causes. Each change of two causes together has a line
+/// of its own.
+fn lines(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<Vec<String>> {
     let largest = cause.kind.largest_ratio().zip(cause.changes.last());
     let is_at_end = largest.is_some_and(|(largest, last)| last.change >= largest);
     let changes: Vec<String> =
-        cause.changes.iter().map(|changed| change(changed, is_at_end)).collect();
-    vec![
+        cause.changes.iter().map(|changed| change(cause.kind, changed, is_at_end)).collect();
+    let (first, others) = match (cause.kind, changes.split_first()) {
+        (_, None) => ("–".to_owned(), &[][..]),
+        (CauseKind::Two, Some((first, others))) => (first.clone(), others),
+        _ => (changes.join(", "), &[][..]),
+    };
+    let line = vec![
         cause.label.clone(),
         format!("{:.3}", cause.probability),
-        if changes.is_empty() { "–".to_owned() } else { changes.join(", ") },
+        first,
         or_dash(cause.left_out_error, in_unit),
         or_dash(cause.poses_to_tell_apart, |poses| poses.to_string()),
-    ]
+    ];
+    let other = |change: &String| {
+        let mut line = vec![String::new(); HEADER.len()];
+        line[2].clone_from(change);
+        line
+    };
+    std::iter::once(line).chain(others.iter().map(other)).collect()
 }
 
 /// Formats a change with its standard error; the name is the part of the parameter's name after the
-/// last dot. A turn has no standard error. Neither has a ratio of the noise: it is the best of some
+/// last dot, or the whole name where two causes changed. A turn has no standard error. Neither has a ratio of the noise: it is the best of some
 /// trial values, the largest one if `is_largest`.
-fn change(change: &Change, is_largest: bool) -> String {
+fn change(kind: CauseKind, change: &Change, is_largest: bool) -> String {
     let (factor, symbol) = if change.unit.is_relative() {
         (100.0, "%".to_owned())
     } else {
         let unit = change.unit.display(change.change);
         (unit.factor, unit.symbol)
     };
-    let name = change.parameter.rsplit('.').next().unwrap_or_default();
+    let name = match kind {
+        CauseKind::Two => &change.parameter,
+        _ => change.parameter.rsplit('.').next().unwrap_or_default(),
+    };
     if !change.std_error.is_finite() && change.unit != Unit::Number {
         return format!("{name} {} {symbol}", number(change.change * factor, 2));
     }

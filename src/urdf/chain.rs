@@ -74,8 +74,14 @@ impl<'a> Chain<'a> {
         let (mut joints, mut passed, mut at) = (Vec::new(), Vec::new(), tip);
         while at != base {
             let Some((joint, parent)) = above.get(at).copied().flatten() else {
+                let parent = |link: &usize| above.get(*link).copied().flatten().map(|of| of.1);
+                let is_exchanged = std::iter::successors(parent(&base), parent).any(|of| of == tip);
                 let (base, tip) = (name(base), name(tip));
-                return Err(robot.error(UrdfErrorKind::NotBelow { base, tip, above: passed }));
+                return Err(robot.error(if is_exchanged {
+                    UrdfErrorKind::EndsExchanged { base, tip }
+                } else {
+                    UrdfErrorKind::NotBelow { base, tip, above: passed }
+                }));
             };
             joints.push(joint);
             passed.push(name(parent));
@@ -99,9 +105,17 @@ impl<'a> Chain<'a> {
     /// Finds the chain of a problem that was made from a URDF, between the links that it states.
     ///
     /// # Errors
-    /// Returns the errors of [`new`](Self::new).
+    /// Returns the errors of [`new`](Self::new), and an error if the URDF has no link with one of
+    /// these names.
     pub fn from_problem(robot: &'a Robot, problem: &Problem) -> Result<Self, InputError> {
         let ends = problem.urdf.as_ref();
+        let named = ends.into_iter().flat_map(|ends| [&ends.base, &ends.tip]);
+        if let Some(link) = named.into_iter().find(|link| robot.link(link).is_err()) {
+            let (problem, robot_name) = (problem.name.clone(), robot.name.clone());
+            let link = link.clone();
+            let kind = UrdfErrorKind::OtherRobot { link, problem, robot: robot_name };
+            return Err(robot.error(kind));
+        }
         Self::new(robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))
     }
 

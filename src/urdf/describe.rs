@@ -403,6 +403,7 @@ fn data(chain: &Chain, rows: &[Row], has_camera: bool) -> String {
         "#   x_mm, y_mm, z_mm: the target, which moves with {}, in the measuring frame\n\
          [data]\nfiles = [\"measurements.csv\"]\n\
          position_sigma_mm = {SIGMA_MM}                         # 1 σ of a measured coordinate: put in that of your instrument\n\
+         # orientation_sigma_deg = 0.02                   # 1 σ of a measured orientation; without it orientations in the table are not fitted\n\
          held_out = {{ fraction = {HELD_OUT}, seed = 1 }}          # poses that judge and are not fitted\n",
         chain.ends().1
     );

@@ -84,6 +84,27 @@ fn a_moved_zero_and_a_moved_tool_are_named_with_their_size() {
 }
 
 #[test]
+fn two_changes_at_once_are_named_together() {
+    let bench = Bench::new();
+    for seed in [2, 3, 5] {
+        let (arm, estimate) = calibrated(&bench, seed);
+        let moved = Vector3::new(0.3e-3, -0.3e-3, 0.2e-3);
+        let arm = with_tool(&with_zero(&arm, 4, 0.15), moved);
+        let rows = bench.measure(&arm, 15, 4030 + seed, 1.0);
+        let verdict = judged(&bench, &estimate, &rows);
+        let named = verdict.named().unwrap();
+        assert_eq!(named.kind, CauseKind::Two, "{verdict:?}");
+        assert_contains(&named.label, &["tool", " and ", "zero of joint 4"]);
+        assert_eq!(verdict.unexplained_error(), None, "{verdict:?}");
+        // Drift may hide one of the two: the other one is then said not to be the whole change.
+        let verdict = watch(&bench.problem, &estimate, &rows, (365.0, 0.01)).unwrap();
+        if verdict.named().is_some_and(|cause| cause.kind == CauseKind::Zero) {
+            assert!(verdict.unexplained_error().is_some(), "{verdict:?}");
+        }
+    }
+}
+
+#[test]
 fn a_change_that_only_drift_explains_is_said_to_be_drift() {
     let bench = Bench::new();
     let (arm, estimate) = calibrated(&bench, 2);

@@ -576,6 +576,7 @@ fn next_images_show_the_board_as_the_measured_ones_do() {
         explanations: None,
         remainder: false,
         fit: Options::default(),
+        update: None,
     };
     let next = design::next(&problem, &data, &Candidates::Within(ranges), &options).unwrap();
     assert_eq!(next.poses.len(), 4);

@@ -16,7 +16,7 @@ use crate::error::{binary_format, one_line};
 use crate::files::{Changes, changed_key, read_limited};
 use crate::fit::checks::pose_sufficiency::label;
 use crate::fit::{Placement, Strategy};
-use crate::measurement::{Measurements, StartTimes};
+use crate::measurement::{Measurements, StartTimes, is_date};
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
@@ -134,11 +134,11 @@ impl SavedEstimate {
         self.parameters.iter().any(|entry| of_part(&entry.name))
     }
 
-    /// Returns the sessions of a table whose base the estimate does not know, although it knows
-    /// bases of other sessions.
+    /// Returns the sessions of a table whose base the estimate does not know, although it knows other
+    /// bases.
     #[doc(hidden)]
     pub fn unknown_sessions<'a>(&self, rows: &'a Measurements) -> Vec<&'a str> {
-        let knows_bases = self.parameters.iter().any(|entry| entry.name.starts_with("base["));
+        let knows_bases = self.parameters.iter().any(|entry| entry.name.starts_with("base"));
         let names = rows.session.names.iter().map(String::as_str);
         let is_unknown = |name: &&str| !name.is_empty() && !self.has_part(&label("base", name));
         if knows_bases { names.filter(is_unknown).collect() } else { Vec::new() }
@@ -285,6 +285,23 @@ impl SavedEstimate {
         self.strategy.model(declared)
     }
 
+    /// Returns the identified relative error of measured lengths; `None` if the problem declares no
+    /// `tracker-scale`.
+    #[doc(hidden)]
+    pub fn measurement_scale(&self) -> Option<f64> {
+        let is_scale = |entry: &&Entry| entry.name.starts_with("tracker-scale");
+        self.parameters.iter().find(is_scale).map(|entry| entry.estimate)
+    }
+
+    /// Returns the days from the first pose of the identification to the first of these rows; `None`
+    /// unless both have dates.
+    #[doc(hidden)]
+    pub fn days_until(&self, rows: &Measurements) -> Option<f64> {
+        let first = self.start_times.as_ref()?.first;
+        let later = rows.start_times().first - first;
+        (rows.has_dates() && is_date(first)).then_some(later / 86_400.0)
+    }
+
     /// Sets the elapsed times of `poses` to those since the start of their session in the
     /// identification; `placement` is that of the poses. Without start times in the file, they
     /// stay.
@@ -399,6 +416,15 @@ impl SavedEstimate {
     /// Returns the name of the problem that was identified.
     pub(crate) fn problem_name(&self) -> &str {
         &self.problem
+    }
+
+    /// Returns the numbers of declared joints of this estimate and of `other` if they differ; `None`
+    /// if they are equal or not known.
+    pub(crate) fn joint_counts(&self, other: &Self) -> Option<[usize; 2]> {
+        let [one, two] = [self, other].map(|estimate| {
+            estimate.arm_parts.keys().filter(|part| part.starts_with("joint ")).count()
+        });
+        (one != two && one.min(two) > 0).then_some([one, two])
     }
 
     /// Returns the first part of the declared arm in which this estimate and `other` differ; `None`

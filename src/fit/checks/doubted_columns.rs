@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::followed_commands::{Unrelated, unrelated};
+use super::followed_commands::{Relation, Unrelated, unrelated};
 use super::misfit::Misfit;
 use super::row_kind::format_error;
 use super::row_relation::{OtherRows, other_rows};
@@ -146,12 +146,26 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
         return None;
     }
     let joints: Vec<usize> = moving(fit).collect();
-    let Unrelated { joint, after } = unrelated(fit, before, &joints)?;
-    let name = column_name(fit.fitting.measurements, joint);
+    let Unrelated { joint, after, relation } = unrelated(fit, before, &joints)?;
+    let rows = fit.fitting.measurements;
+    let name = column_name(rows, joint);
+    let what = match relation {
+        None => "the column may hold a speed, a deviation or another axis".to_owned(),
+        Some(Relation::LostSign) => {
+            "the sign of its numbers is lost, none of which is negative".to_owned()
+        }
+        Some(Relation::ReversedFrom(row)) => {
+            format!("about from {} on it counts the other way", rows.location(row))
+        }
+        Some(Relation::Reversed) => "some of its numbers have the other sign".to_owned(),
+        Some(Relation::HalfTurns) => {
+            "some of its numbers are half a turn off, as angles that were wrapped to 180°"
+                .to_owned()
+        }
+    };
     let text = format!(
         "the positions do not follow the column {name}: with the coordinate of joint {} found from each \
-         position, the nominal arm misses them by {} instead of {}; the column may hold a speed, a \
-         deviation or another axis",
+         position, the nominal arm misses them by {} instead of {}; {what}",
         joint + 1,
         format_error("position", after, 3),
         format_error("position", before, 1)

@@ -26,6 +26,17 @@ pub(super) const OF_MISFIT: [FindingCode; 4] = [
     FindingCode::NoiseBeyondDeclared,
 ];
 
+/// Codes of findings that name a mistake of the input.
+pub(in crate::fit) const MISTAKES: [FindingCode; 7] = [
+    FindingCode::Misread,
+    FindingCode::ViewsReversed,
+    FindingCode::ColumnDoubted,
+    FindingCode::RowsDoubted,
+    FindingCode::RowsChanged,
+    FindingCode::OtherSize,
+    FindingCode::ScaleContradicted,
+];
+
 /// Description of a finding code, one row of the table in `docs/findings.md`.
 #[derive(Debug, Clone, Copy)]
 pub struct FindingEntry {
@@ -112,7 +123,7 @@ finding_codes! {
         "A second arm, more than 3 standard errors from the fitted one, explains the measurements too: its probability is above 0.1 %.",
         "measure poses in which the two differ, or give priors that decide between them";
     BeyondPrior: Error "beyond-prior" ["parameter", "sigmas"]
-        "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",
+        "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior, or of the part of it that the data determine beside others that act alike.",
         "check axes of the measuring frame, signs of joints, units, and the prior";
     ScaleContradicted: Error "scale-contradicted" ["error", "sigmas", "lengths"]
         "All fitted lengths of the arm together deviate from nominal by one factor, more than \
@@ -290,6 +301,14 @@ impl Finding {
     /// Returns the number with the name `name`; `None` if it is missing or a word.
     pub fn number(&self, name: &str) -> Option<f64> {
         self.value(name)?.as_f64()
+    }
+
+    /// Returns the whole number with the name `name`, or the length of this list; `None` if it is
+    /// neither.
+    pub(crate) fn count(&self, name: &str) -> Option<usize> {
+        let value = self.value(name)?;
+        let listed = value.as_array().map(Vec::len);
+        listed.or_else(|| usize::try_from(value.as_u64()?).ok())
     }
 
     /// Returns the word with the name `name`; `None` if it is missing or a number.

@@ -36,6 +36,62 @@ pub(super) struct Unrelated {
     pub joint: usize,
     /// Error of the registered nominal arm with the coordinate found from each position \[m\].
     pub after: f64,
+    /// Relation of the found coordinates to those of the column; `None` if none is seen.
+    pub relation: Option<Relation>,
+}
+
+/// Relation of the true coordinates of a joint to those of its column.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Relation {
+    /// Some coordinates have the other sign; the column has no negative number.
+    LostSign,
+    /// Coordinates from this row on have the other sign.
+    ReversedFrom(usize),
+    /// Some coordinates have the other sign.
+    Reversed,
+    /// Some coordinates differ by half a turn.
+    HalfTurns,
+}
+
+/// Largest difference of a found coordinate from one that the column explains \[rad\].
+const MAX_DIFFERENCE: f64 = 0.1;
+/// Smallest share of the rows that a relation explains.
+const MIN_RELATED_SHARE: f64 = 0.9;
+/// Smallest share of the rows in which a relation changes the coordinate.
+const MIN_CHANGED_SHARE: f64 = 0.1;
+
+/// Returns the relation of the coordinates of a turning joint that were `found` in some rows to their
+/// commands. Each row is given with its command and the found coordinate \[rad\].
+fn relation(found: &[(usize, f64, f64)]) -> Option<Relation> {
+    let is_near = |difference: f64| {
+        let turns = (difference / TAU).round();
+        (difference - turns * TAU).abs() < MAX_DIFFERENCE
+    };
+    let count = found.len() as f64;
+    let is_same = |&(_, command, coordinate): &(usize, f64, f64)| is_near(coordinate - command);
+    let explains = |is_changed: &dyn Fn(&(usize, f64, f64)) -> bool| {
+        let changed: Vec<usize> = found
+            .iter()
+            .filter(|of| !is_same(of) && is_changed(of))
+            .map(|(row, ..)| *row)
+            .collect();
+        let same = found.iter().filter(|of| is_same(of)).count();
+        let is_enough = changed.len() as f64 >= MIN_CHANGED_SHARE * count
+            && (same + changed.len()) as f64 >= MIN_RELATED_SHARE * count;
+        is_enough.then_some(changed)
+    };
+    if let Some(reversed) = explains(&|(_, command, coordinate)| is_near(coordinate + command)) {
+        if found.iter().all(|(_, command, _)| *command >= 0.0) {
+            return Some(Relation::LostSign);
+        }
+        let (&first, &last) = (reversed.first()?, found.last().map(|(row, ..)| row)?);
+        let kept =
+            found.iter().filter(|of| of.0 >= first && is_same(of) && of.1.abs() > MAX_DIFFERENCE);
+        let is_run = reversed.contains(&last) && kept.count() == 0;
+        return Some(if is_run { Relation::ReversedFrom(first) } else { Relation::Reversed });
+    }
+    explains(&|(_, command, coordinate)| is_near(coordinate - command + PI))
+        .map(|_| Relation::HalfTurns)
 }
 
 /// Returns the only joint whose column does not hold its coordinate, if the positions fit with that
@@ -48,19 +104,29 @@ pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Opti
     if rows.len() < MIN_ROWS {
         return None;
     }
-    let error = |&joint: &usize| Some((joint, error_without(fit, &rows, joint)?));
-    let mut errors: Vec<(usize, f64)> = joints.iter().filter_map(error).collect();
+    let error = |&joint: &usize| {
+        let (error, found) = error_without(fit, &rows, joint)?;
+        Some((joint, error, found))
+    };
+    let mut errors: Vec<(usize, f64, Vec<f64>)> = joints.iter().filter_map(error).collect();
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let &(joint, after) = errors.first()?;
+    let &(joint, after, ref found) = errors.first()?;
     let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
     let limit = (MAX_RATIO * before).min((MAX_MISS * kind.spread).max(noise));
     let is_alone = errors.get(1).is_none_or(|next| after < MAX_RATIO_TO_OTHERS * next.1);
-    (after < limit && is_alone).then_some(Unrelated { joint, after })
+    let command = |row: usize| fit.fitting.measurements.configuration(row)[joint];
+    let pairs = rows.iter().zip(found).map(|(&row, &coordinate)| (row, command(row), coordinate));
+    let is_turning = fit.problem.joints[joint].command_kind() == JointKind::Revolute;
+    (after < limit && is_alone).then(|| Unrelated {
+        joint,
+        after,
+        relation: relation(&pairs.collect::<Vec<_>>()).filter(|_| is_turning),
+    })
 }
 
 /// Returns the rms error of the registered nominal arm in `rows` with the coordinates of a joint
-/// found from the positions \[m\].
-fn error_without(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<f64> {
+/// found from the positions \[m\], and these coordinates.
+fn error_without(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<(f64, Vec<f64>)> {
     let Fitting { placement, model, measurements, .. } = *fit.fitting;
     let split = Split { identification: rows.to_vec(), held_out: Vec::new() };
     let mut table = measurements.clone();
@@ -115,7 +181,7 @@ fn error_without(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<f64> 
         let squares = errors_at(&found);
         last = (squares.iter().map(Vector3::norm_squared).sum::<f64>() / rows.len() as f64).sqrt();
     }
-    last.is_finite().then_some(last)
+    last.is_finite().then_some((last, found))
 }
 
 /// Writes the coordinates of a joint into `rows` of a table.

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::misreading::{MAX_NOISE_SIGMAS, misread_masses};
+use super::misreading::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_NOISE_SIGMAS, misread_masses};
 use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::format_error;
@@ -24,16 +24,9 @@ const MAX_EXCESS_LEFT_BY_MASS: f64 = 0.04;
 /// Largest rms residual of a fit with a mass corrected, as a multiple of the declared σ, with which
 /// the mass explains what a fit near the noise leaves.
 const MAX_SIGMAS_LEFT_BY_MASS: f64 = 1.5;
-/// Largest ratio of the error with a misreading undone to that as read, at which the misreading is
-/// sure although more than noise is left. Another cause that acts alike hardly removes as much.
-const MAX_CLEAR_RATIO: f64 = 0.02;
-
 /// Largest ratio of the rms residual of the fit as read to its error with the deviations from
 /// priors, at which the text states the residual.
 const MAX_PLAIN_PART: f64 = 0.8;
-
-/// Maximum number of misreadings that the text of the finding names.
-const MAX_NAMED: usize = 4;
 
 /// Checks that no misreading of table or problem (unit, sign, order, convention) explains the
 /// measurements far better.

@@ -44,7 +44,7 @@ mod view_order;
 use serde_json::Value;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
-use finding::{Finding, FindingCode, OF_MISFIT};
+use finding::{Finding, FindingCode, MISTAKES, OF_MISFIT};
 
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
 /// print the first finding that is an error as the reason.
@@ -55,6 +55,7 @@ const CHECKS: &[&dyn Check] = &[
     &table_digits::PositionsAreMeasured,
     &misfit::Misfit,
     &misfit::SizeOfArm,
+    &orientation::OrientationsFit,
     &doubted_columns::ColumnsHoldMeasurements,
     &doubted_rows::RowsBelongTogether,
     &changed_rows::RowsStayAlike,
@@ -68,7 +69,6 @@ const CHECKS: &[&dyn Check] = &[
     &held_out::BetterThanNominal,
     &priors::PriorsHold,
     &priors::NoiseIsDeclared,
-    &orientation::OrientationsFit,
     &priors::DataDecide,
     &pose_range::PosesSpread,
     &nominal_error::NominalIsNear,
@@ -106,17 +106,6 @@ const OF_TABLE: [FindingCode; 4] = [
     FindingCode::ColumnDoubted,
     FindingCode::RowsDoubted,
     FindingCode::LimitContradicted,
-];
-
-/// Codes of findings that name a mistake of the input.
-const MISTAKES: [FindingCode; 7] = [
-    FindingCode::Misread,
-    FindingCode::ViewsReversed,
-    FindingCode::ColumnDoubted,
-    FindingCode::RowsDoubted,
-    FindingCode::RowsChanged,
-    FindingCode::OtherSize,
-    FindingCode::ScaleContradicted,
 ];
 
 /// Codes of findings that follow from a mistake of the input, and whose usual remedies apply only

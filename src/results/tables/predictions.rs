@@ -150,10 +150,21 @@ pub fn commands_csv(
             add(name, &|command| label(labels, command.row));
         }
     }
-    for (name, values) in [("payload_kg", &targets.payload), ("hoist_N", &targets.hoist)] {
+    let conditions = [
+        ("payload_kg", targets.payload.as_ref()),
+        ("hoist_N", targets.hoist.as_ref()),
+        ("temperature_C", targets.temperature.as_ref()),
+        ("time_s", targets.time_measured.then_some(&targets.time)),
+    ];
+    for (name, values) in conditions {
         if let Some(values) = values {
             add(name, &|command| fixed(values[command.row], 4));
         }
+    }
+    let covariates = problem.data.covariates.iter().enumerate();
+    let has_covariates = targets.covariates.len() == problem.data.covariates.len() * targets.len();
+    for (which, covariate) in covariates.filter(|_| has_covariates) {
+        add(&covariate.name, &|command| fixed(targets.covariates_of(command.row)[which], 6));
     }
     add("miss_mm", &|command| fixed(command.miss.norm() * 1e3, 4));
     add("miss_before_mm", &|command| fixed(command.seed_miss * 1e3, 4));

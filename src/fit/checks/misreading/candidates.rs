@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::commands::{TURN_UNITS, of_commands, of_mixed_units, turns_in};
 use super::{MassScale, Misreading};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
@@ -13,8 +14,6 @@ const MIN_RADIANS: f64 = 0.3;
 /// Range of plausible lengths of a joint \[m\]. A length is tried in another unit if it is then in
 /// this range.
 const PLAUSIBLE_LENGTHS: std::ops::Range<f64> = 0.01..3.0;
-/// Maximum number of joints for which every pair is tried as exchanged or coupled.
-const MAX_PAIRED: usize = 12;
 /// Maximum number of masses that are tried one by one.
 const MAX_MASSES: usize = 12;
 /// Scales of masses that leave an error far beyond the noise.
@@ -28,22 +27,9 @@ const MIN_CENTRE: f64 = 0.02;
 /// Number of joints before and after the declared carrier of a target, camera or marker that are
 /// tried as its carrier.
 pub(super) const MAX_OTHER_CARRIERS: usize = 2;
-/// Step between trial errors of a joint's zero position \[°\]. A full fit finds values between
-/// them.
-const ZERO_POSITION_STEP: i16 = 15;
-/// Trial ratios of the motion of a joint to its command, in hundredths. A full fit finds values
-/// between them.
-/// The last one is that of degrees to radians.
-const TRIAL_RATIOS: [i16; 21] =
-    [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 97, 103, 110, 125, 150, 200, 300, 400, 500, 1000, 5730];
 /// Trial ratios of the measured lengths to those of the arm, in hundredths. A full fit finds values
 /// between them.
 const TRIAL_SCALES: [i16; 8] = [80, 90, 95, 98, 102, 105, 110, 125];
-/// Units of angles that are taken for degrees, in hundredths of a degree: gradians, tenths and
-/// hundredths of a degree.
-const TURN_UNITS: [i16; 3] = [90, 10, 1];
-/// Usual leads of ball screws \[mm\]. A full fit finds values near them.
-const SCREW_LEADS: [i16; 12] = [4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 40, 50];
 /// Trial errors of an angle α of the joint table \[°\]. For α = ±90°, an error of 180° is the same
 /// as the other sign, which is tried anyway.
 const TWISTS: [i16; 3] = [-90, 90, 180];
@@ -67,12 +53,14 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(turns(true).then_some(Misreading::Degrees));
     units.extend(turns(false).then_some(Misreading::Radians));
     if turns(false) {
-        units.extend(TURN_UNITS.map(|hundredths| Misreading::TurnUnit { hundredths }));
+        units.extend(TURN_UNITS.map(|per_turn| Misreading::TurnUnit { per_turn }));
     }
+    units.extend(of_mixed_units(problem, table));
     units.extend(of_slides(problem, table));
     units.extend(lengths(false).then_some(Misreading::Metres));
     units.extend(lengths(true).then_some(Misreading::Millimetres));
     units.extend(lengths(false).then_some(Misreading::Inches));
+    units.extend(lengths(false).then_some(Misreading::Centimetres));
     let powers = if lengths(false) { [3, 1] } else { [-3, -2] };
     let of_axis = |axis: usize| powers.map(|power| Misreading::AxisUnit { axis, power });
     units.extend((0..3).flat_map(of_axis));
@@ -129,52 +117,6 @@ pub(super) fn is_far(problem: &Problem) -> bool {
     problem.targets.is_empty() && problem.tool.target.norm() > MIN_MILLIMETRE_LENGTH
 }
 
-/// Returns the misreadings of the joint columns: signs, exchanged columns, couplings, zero
-/// positions and ratios.
-fn of_commands(problem: &Problem) -> Vec<Misreading> {
-    let kind = |joint: usize| problem.joints[joint - 1].command_kind();
-    let moving: Vec<usize> = (1..=problem.joints.len().min(64))
-        .filter(|&joint| kind(joint) != JointKind::Fixed)
-        .collect();
-    let is_ordered = moving.len() > 3 && moving.iter().all(|&joint| kind(joint) == kind(moving[0]));
-    let turning = moving.iter().copied().filter(|&joint| kind(joint) == JointKind::Revolute);
-    let turning: Vec<usize> = turning.collect();
-    let mut misreadings: Vec<Misreading> =
-        moving.iter().map(|&joint| Misreading::reversed(&[joint])).collect();
-    misreadings.extend(is_ordered.then_some(Misreading::OppositeOrder));
-    let is_alphabetical = by_name(problem).is_sorted();
-    misreadings.extend((is_ordered && !is_alphabetical).then_some(Misreading::Alphabetical));
-    let places = if is_ordered { moving.len() } else { 1 };
-    misreadings.extend((1..places).map(|by| Misreading::Rotated { by }));
-    for (k, &joint) in moving.iter().enumerate().take(MAX_PAIRED) {
-        for &with in &moving[k + 1..moving.len().min(MAX_PAIRED)] {
-            if kind(joint) != kind(with) {
-                let is_sliding = kind(joint) == JointKind::Prismatic;
-                let (joint, from) = if is_sliding { (with, joint) } else { (joint, with) };
-                let screw = |lead| Misreading::Screw { joint, from, lead };
-                misreadings.extend(SCREW_LEADS.iter().flat_map(|&lead| [lead, -lead].map(screw)));
-                continue;
-            }
-            misreadings.push(Misreading::Exchanged { joint, with });
-            for (joint, from) in [(joint, with), (with, joint)] {
-                let coupled = |is_opposite| Misreading::Coupled { joint, from, is_opposite };
-                misreadings.extend([false, true].map(coupled));
-            }
-        }
-    }
-    for &joint in &turning {
-        let steps =
-            (1 - 180 / ZERO_POSITION_STEP..=180 / ZERO_POSITION_STEP).filter(|&step| step != 0);
-        misreadings.extend(
-            steps.map(|step| Misreading::Zero { joint, degrees: step * ZERO_POSITION_STEP }),
-        );
-    }
-    for &joint in &moving {
-        misreadings.extend(TRIAL_RATIOS.map(|percent| Misreading::Ratio { joint, percent }));
-    }
-    misreadings
-}
-
 /// Returns the misreadings in which positions are shifted by rows against the configurations.
 pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     let shifts = (-MAX_SHIFT..=MAX_SHIFT).filter(|&by| by != 0);
@@ -200,14 +142,6 @@ fn of_text_order(table: &Measurements) -> Vec<Misreading> {
     }
 }
 
-/// Returns the indices of the joints that take commands, in the alphabetical order of their names.
-pub(super) fn by_name(problem: &Problem) -> Vec<usize> {
-    let moves = |joint: &usize| problem.joints[*joint].command_kind() != JointKind::Fixed;
-    let mut joints: Vec<usize> = (0..problem.joints.len()).filter(moves).collect();
-    joints.sort_by_key(|&joint| &problem.joints[joint].name);
-    joints
-}
-
 /// Returns the numbers of `rows` rows, from `first` on, in the order of their texts.
 pub(super) fn text_order(rows: usize, first: u8) -> Vec<usize> {
     let first = usize::from(first);
@@ -231,7 +165,7 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     forms.extend(of_exchanged_lengths(problem));
     let fields = [Alpha, Theta, Beta];
     for field in fields {
-        let mut counts = [0; 2];
+        let mut counts = [0; 3];
         for (joint, declared) in (1..).zip(&problem.joints) {
             let mut declared = declared.clone();
             let Some(&mut angle) = number_of(&mut declared, field) else { continue };
@@ -245,8 +179,10 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
             }
             if angle != 0.0 {
                 forms.push(Misreading::Sign { joint, field });
+                counts[2] += 1;
             }
         }
+        forms.extend((counts[2] > 1).then_some(Misreading::Sign { joint: 0, field }));
         forms.extend((counts[0] > 1).then_some(Misreading::TableRadians { joint: 0, field }));
         forms.extend((counts[1] > 1).then_some(Misreading::TableDegrees { joint: 0, field }));
     }
@@ -353,12 +289,24 @@ pub(super) fn of_places(problem: &Problem, table: &Measurements) -> Vec<Misreadi
     is_elsewhere.then_some(Misreading::PayloadAtTarget).into_iter().chain(centres).collect()
 }
 
+/// Returns the misreadings of suspension forces: in kilograms instead of newtons, and in the
+/// opposite direction.
+pub(super) fn of_hoists(problem: &Problem) -> Vec<Misreading> {
+    let has_hoist = problem
+        .joints
+        .iter()
+        .any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()));
+    let hoists = [false, true].map(|is_reversed| Misreading::Hoist { is_reversed });
+    hoists.into_iter().filter(|_| has_hoist).collect()
+}
+
 /// Returns the misreadings of masses, payloads, stiffnesses and gravity; none for a rigid arm.
 pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
     if !problem.is_elastic() {
         return Vec::new();
     }
     let mut misreadings = of_masses(problem, table, &GROSS_MASS_SCALES);
+    misreadings.extend(of_hoists(problem));
     let elastic = (1..).zip(&problem.joints).filter(|(_, joint)| joint.stiffness.is_some());
     let elastic: Vec<usize> = elastic.map(|(joint, _)| joint).collect();
     let single = if elastic.len() > 1 { elastic.as_slice() } else { &[] };
@@ -371,20 +319,6 @@ pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreadin
         misreadings.extend([false, true].map(of_sign));
     }
     misreadings
-}
-
-/// Returns true if a joint is revolute and its column was read as radians, or as degrees if
-/// `radians` is false. Returns true for both if the unit of the column is not known.
-pub(super) fn turns_in(
-    problem: &Problem,
-    table: &Measurements,
-    joint: usize,
-    radians: bool,
-) -> bool {
-    let turns =
-        problem.joints.get(joint).is_some_and(|joint| joint.command_kind() == JointKind::Revolute);
-    let column = table.command_columns.iter().find(|column| column.joint == joint);
-    turns && column.is_none_or(|column| (column.unit >= 1.0) == radians)
 }
 
 /// Returns the declared lengths of a joint \[m\]: a, d, and the translation of its placement.

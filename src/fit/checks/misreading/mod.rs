@@ -7,8 +7,10 @@
 
 mod candidates;
 mod chosen_rows;
+mod commands;
 mod explanation;
 mod images;
+mod known_arm;
 mod masses;
 mod search;
 mod target;
@@ -17,8 +19,9 @@ mod words;
 
 pub(in crate::fit) use explanation::Explanations;
 pub(crate) use explanation::MisreadEffect;
+pub(crate) use known_arm::misread_table;
 pub(in crate::fit) use masses::misread_masses;
-pub(in crate::fit) use search::MAX_NOISE_SIGMAS;
+pub(in crate::fit) use search::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_NOISE_SIGMAS};
 
 use crate::model::parameter::JointField;
 
@@ -31,11 +34,24 @@ pub enum Misreading {
     Degrees,
     /// Joint angles are in radians, declared as degrees.
     Radians,
-    /// Joint angles are in another unit, declared as degrees: gradians (400 to a turn), tenths or
-    /// hundredths of a degree.
+    /// Joint angles are in another unit, declared as degrees: gradians, tenths or hundredths of a
+    /// degree, or counts of an encoder.
     TurnUnit {
-        /// One unit of the numbers in hundredths of a degree.
-        hundredths: i16,
+        /// Number of these units to a turn.
+        per_turn: u32,
+    },
+    /// The angles of some joints alone are in radians, declared as degrees, or the reverse.
+    MixedUnits {
+        /// Set of these joints as bits, as in [`Misreading::Reversed`].
+        joints: u64,
+        /// True if these angles are in radians.
+        is_radians: bool,
+    },
+    /// The columns of three joints, by number, are exchanged in a ring: each holds the angles of the
+    /// next joint, the last one those of the first.
+    Cycled {
+        /// Numbers of the joints, from 1.
+        joints: [usize; 3],
     },
     /// Coordinates of sliding joints are in another unit.
     Slides {
@@ -48,6 +64,8 @@ pub enum Misreading {
     Millimetres,
     /// Positions are in inches, declared as millimetres.
     Inches,
+    /// Positions are in centimetres, declared as millimetres.
+    Centimetres,
     /// All positions are longer or shorter by one factor, because the instrument or the joint table
     /// has a wrong scale.
     Scale {
@@ -251,6 +269,11 @@ pub enum Misreading {
         /// Number of rows by which a payload comes after its configuration; negative if before.
         by: i8,
     },
+    /// Suspension forces are in kilograms, declared as newtons, or pull the other way.
+    Hoist {
+        /// True if the forces pull the other way.
+        is_reversed: bool,
+    },
     /// Stiffnesses of joints are in another unit.
     Stiffness {
         /// Number of the joint, from 1; 0 for all joints.
@@ -293,6 +316,9 @@ pub enum Misreading {
     },
 }
 
+/// Weight of a kilogram \[N\].
+const STANDARD_GRAVITY: f64 = 9.80665;
+
 /// Unit or decimal point of a number that was declared as a mass in kilograms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -306,6 +332,15 @@ pub enum MassScale {
 }
 
 impl Misreading {
+    /// Returns the factor by which suspension forces must be multiplied; 1 for other misreadings.
+    fn hoist_factor(self) -> f64 {
+        match self {
+            Self::Hoist { is_reversed: true } => -1.0,
+            Self::Hoist { is_reversed: false } => STANDARD_GRAVITY,
+            _ => 1.0,
+        }
+    }
+
     /// Creates the misreading that the angles of these joints, counted from 1, have the opposite
     /// sign.
     pub fn reversed(joints: &[usize]) -> Self {
@@ -344,6 +379,7 @@ impl Misreading {
             | Self::TableDegrees { joint, field } => (joint, 0, Some(field)),
             Self::Twist { joint, .. } => (joint, 0, Some(JointField::Alpha)),
             Self::Mass { mass, .. } => (mass, 0, None),
+            Self::Hoist { is_reversed } => (usize::from(is_reversed), 0, None),
             Self::Stiffness { joint, power } => {
                 (joint, usize::from(power.unsigned_abs()) + usize::from(power > 0) * 8, None)
             }
@@ -353,17 +389,25 @@ impl Misreading {
             Self::Mounted { fixture, frame: with } | Self::ExchangedMounts { fixture, with } => {
                 (fixture, with, None)
             }
-            Self::TurnUnit { hundredths } => (hundredths.unsigned_abs().into(), 0, None),
+            Self::TurnUnit { per_turn } => (per_turn as usize, 0, None),
+            Self::Cycled { joints: [first, second, third] } => (first, 64 * second + third, None),
             Self::AxisUnit { axis, .. } | Self::AxisInches { axis } => (axis, 0, None),
             Self::ExchangedRows { row } => (row, 0, None),
             Self::ExchangedLengths { joint, field, with, other } => {
                 (joint, 2 * with + usize::from(other == JointField::D), Some(field))
             }
-            Self::Reversed { joints } => (usize::try_from(joints).unwrap_or(usize::MAX), 0, None),
+            Self::Reversed { joints } | Self::MixedUnits { joints, .. } => {
+                (usize::try_from(joints).unwrap_or(usize::MAX), 0, None)
+            }
             _ => (0, 0, None),
         };
         (std::mem::discriminant(&self), first, second, field)
     }
+}
+
+/// Returns 10 to the power `power`, the factor between two units of a length or a mass.
+fn power_of_ten(power: i8) -> f64 {
+    10.0_f64.powi(power.into())
 }
 
 /// Returns the numbers, from 1, of the joints in a set of bits: bit k is set for joint k + 1.

@@ -28,7 +28,7 @@ use crate::problem::{Observation, Problem};
 const MAX_EXPLAINED_RATIO: f64 = 0.2;
 /// Largest ratio of the error with a misreading corrected to that with the best one, at which the
 /// misreading is also named.
-const MAX_RATIO_TO_BEST: f64 = 1.5;
+pub(super) const MAX_RATIO_TO_BEST: f64 = 1.5;
 /// Largest rms error of the registered nominal arm, as a multiple of its reach, for which
 /// misreadings are searched. Millimetres read as metres give a factor of 1000.
 const MAX_REACHES: f64 = 1e4;
@@ -53,7 +53,7 @@ const MIN_RATIO_ERROR: f64 = 1e-3;
 /// Maximum number of identification rows, evenly spaced, to which misreadings are applied.
 const MAX_ROWS: usize = 120;
 /// Maximum number of moving joints of which every subset is tried as reversed.
-const MAX_REVERSED: usize = 7;
+pub(super) const MAX_REVERSED: usize = 7;
 /// Maximum number of misreadings that are fitted in full: those with the smallest error of the
 /// registered nominal arm.
 const MAX_FITTED_MISREADINGS: usize = 12;
@@ -62,6 +62,11 @@ const MAX_STEPS: u64 = 60;
 /// Largest rms residual of a fit with a misreading undone that counts as noise, as a multiple of
 /// the declared σ. Residuals of real arms reach several σ.
 pub(in crate::fit) const MAX_NOISE_SIGMAS: f64 = 5.0;
+/// Largest ratio of the error with a misreading undone to that as read, at which the misreading is
+/// sure although more than noise is left. Another cause that acts alike hardly removes as much.
+pub(in crate::fit) const MAX_CLEAR_RATIO: f64 = 0.02;
+/// Maximum number of misreadings that the text of the finding names.
+pub(in crate::fit) const MAX_NAMED: usize = 4;
 /// Relative reduction of the cost by one step below which a registration without a full fit ends.
 /// The error is then accurate enough for a comparison at [`MAX_RATIO_TO_BEST`].
 const TRIAL_TOLERANCE: f64 = 1e-4;

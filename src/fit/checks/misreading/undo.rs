@@ -5,13 +5,14 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::candidates::{
-    MIN_MILLIMETRE_LENGTH, by_name, is_far, lengths_of, masses_of, number_of, text_order, turns_in,
+    MIN_MILLIMETRE_LENGTH, is_far, lengths_of, masses_of, number_of, text_order,
 };
+use super::commands::radians_per_metre;
 use super::images::shift_views;
-use super::{MassScale, Misreading, numbers_of};
+use super::{MassScale, Misreading, STANDARD_GRAVITY, power_of_ten};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
-use crate::problem::{Effect, Joint, JointKind, ParameterRule, Problem};
+use crate::problem::{Effect, Joint, ParameterRule, Problem};
 
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
@@ -28,18 +29,13 @@ pub(super) fn is_unit_ratio(size: f64) -> bool {
     UNIT_RATIOS.iter().any(|ratio| (size / ratio - 1.0).abs() < UNIT_RATIO_TOLERANCE)
 }
 
-/// Returns 10 to the power `power`, the factor between two units of a length or a mass.
-pub(super) fn power_of_ten(power: i8) -> f64 {
-    10.0_f64.powi(power.into())
-}
-
 impl MassScale {
     /// Returns the factor by which the number must be multiplied.
     pub(super) fn factor(self) -> f64 {
         match self {
             Self::Power(power) => power_of_ten(power),
             Self::Pounds => 0.453_592_37,
-            Self::Newtons => 9.80665_f64.recip(),
+            Self::Newtons => STANDARD_GRAVITY.recip(),
         }
     }
 }
@@ -129,6 +125,7 @@ impl Misreading {
             Self::Payload { scale } => problem.tool.payload_mass *= scale.factor(),
             Self::Mass { .. }
             | Self::Stiffness { .. }
+            | Self::Hoist { .. }
             | Self::Gravity { .. }
             | Self::Carrier { .. }
             | Self::Mounted { .. }
@@ -158,6 +155,11 @@ impl Misreading {
                 let chosen = joints.filter(|(number, _)| joint == 0 || *number == joint);
                 let stiffnesses = chosen.filter_map(|(_, joint)| joint.stiffness.as_mut());
                 stiffnesses.for_each(|stiffness| *stiffness *= factor);
+            }
+            Self::Hoist { .. } => {
+                let beams = problem.joints.iter_mut().filter_map(|joint| joint.beam.as_mut());
+                let hoists = beams.filter_map(|beam| beam.hoist.as_mut());
+                hoists.for_each(|hoist| hoist.force *= self.hoist_factor());
             }
             Self::Carrier { target, joint } => {
                 if problem.targets.is_empty() {
@@ -265,7 +267,9 @@ impl Misreading {
         chosen: &[usize],
         (problem, joints): (&Problem, usize),
     ) -> Measurements {
-        let mut rows = if let Self::Shifted { by, from } = self {
+        let mut rows = if let Self::Shifted { by, .. } | Self::ShiftedPayload { by } = self {
+            // Rows whose position or payload the table does not hold are left out.
+            let from = self.shifted_from().unwrap_or(0);
             let source = |row: usize| {
                 let shifted = row.checked_add_signed(by.into())?;
                 if row < from { Some(row) } else { (shifted < table.len()).then_some(shifted) }
@@ -273,18 +277,12 @@ impl Misreading {
             let pairs = chosen.iter().filter_map(|&row| Some((row, source(row)?)));
             let (chosen, sources): (Vec<usize>, Vec<usize>) = pairs.unzip();
             let mut rows = table.select(&chosen);
-            rows.positions = sources.into_iter().map(|row| table.positions[row]).collect();
-            rows
-        } else if let Self::ShiftedPayload { by } = self {
-            // Rows whose payload the table does not hold are left out.
-            let source = |row: usize| {
-                row.checked_add_signed(by.into()).filter(|&source| source < table.len())
-            };
-            let pairs = chosen.iter().filter_map(|&row| Some((row, source(row)?)));
-            let (chosen, sources): (Vec<usize>, Vec<usize>) = pairs.unzip();
-            let mut rows = table.select(&chosen);
-            let of_table = table.payload.as_ref();
-            rows.payload = of_table.map(|of| sources.into_iter().map(|row| of[row]).collect());
+            if let Self::ShiftedPayload { .. } = self {
+                let of_table = table.payload.as_ref();
+                rows.payload = of_table.map(|of| sources.into_iter().map(|row| of[row]).collect());
+            } else {
+                rows.positions = sources.into_iter().map(|row| table.positions[row]).collect();
+            }
             rows
         } else {
             let mut rows = table.select(chosen);
@@ -300,10 +298,12 @@ impl Misreading {
         for q in rows.configurations.chunks_exact_mut(joints.max(1)) {
             self.undo_command(q, problem, table);
         }
+        rows.hoist.iter_mut().flatten().for_each(|force| *force *= self.hoist_factor());
         match self {
             Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
             Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
             Self::Inches => rows.positions.iter_mut().for_each(|position| *position *= MM_PER_INCH),
+            Self::Centimetres => rows.positions.iter_mut().for_each(|position| *position *= 10.0),
             Self::Scale { percent } => {
                 rows.positions.iter_mut().for_each(|at| *at *= 100.0 / f64::from(percent));
             }
@@ -377,65 +377,6 @@ impl Misreading {
         }
         rows.positions = chosen.iter().map(|&row| table.positions[source[row]]).collect();
     }
-
-    /// Corrects the misreading in a configuration `q` of `table`.
-    fn undo_command(self, q: &mut [f64], problem: &Problem, table: &Measurements) {
-        match self {
-            Self::Degrees | Self::Radians | Self::TurnUnit { .. } => {
-                let (factor, is_radians) = match self {
-                    Self::Degrees => (PI / 180.0, true),
-                    Self::TurnUnit { hundredths } => (f64::from(hundredths) / 100.0, false),
-                    _ => (180.0 / PI, false),
-                };
-                let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, is_radians));
-                turning.for_each(|joint| q[joint] *= factor);
-            }
-            Self::Slides { power } => {
-                let slides = |joint: &usize| {
-                    let kind = problem.joints.get(*joint).map(Joint::command_kind);
-                    kind == Some(JointKind::Prismatic)
-                };
-                (0..q.len()).filter(slides).for_each(|joint| q[joint] *= power_of_ten(power));
-            }
-            Self::OppositeOrder | Self::Rotated { .. } => {
-                let commanded: Vec<usize> = (0..q.len().min(problem.joints.len()))
-                    .filter(|&joint| problem.joints[joint].command_kind() != JointKind::Fixed)
-                    .collect();
-                let mut values: Vec<f64> = commanded.iter().map(|&joint| q[joint]).collect();
-                match self {
-                    Self::Rotated { by } => values.rotate_left(by % commanded.len().max(1)),
-                    _ => values.reverse(),
-                }
-                commanded.iter().zip(values).for_each(|(&joint, value)| q[joint] = value);
-            }
-            Self::Alphabetical => {
-                let sorted = by_name(problem);
-                let mut commanded = sorted.clone();
-                commanded.sort_unstable();
-                let values: Vec<f64> = commanded.iter().map(|&joint| q[joint]).collect();
-                sorted.iter().zip(values).for_each(|(&joint, value)| q[joint] = value);
-            }
-            Self::Reversed { joints } => {
-                numbers_of(joints).for_each(|joint| q[joint - 1] = -q[joint - 1]);
-            }
-            Self::Exchanged { joint, with } => q.swap(joint - 1, with - 1),
-            Self::Coupled { joint, from, is_opposite } => {
-                let sign = if is_opposite { -1.0 } else { 1.0 };
-                q[joint - 1] += sign * q[from - 1];
-            }
-            Self::Screw { joint, from, lead } => {
-                q[joint - 1] += radians_per_metre(lead) * q[from - 1];
-            }
-            Self::Zero { joint, degrees } => q[joint - 1] += f64::from(degrees).to_radians(),
-            Self::Ratio { joint, percent } => q[joint - 1] *= f64::from(percent) / 100.0,
-            _ => {}
-        }
-    }
-}
-
-/// Returns the rotation of a screw divided by its travel \[rad/m\], given its lead \[mm\].
-fn radians_per_metre(lead: i16) -> f64 {
-    2.0 * PI * 1e3 / f64::from(lead)
 }
 
 /// Exchanges the entries of two joints in the joint table. Returns `None`, and changes nothing, if

@@ -4,8 +4,7 @@ use std::f64::consts::PI;
 use std::fmt;
 
 use super::candidates::name_of_mass;
-use super::undo::power_of_ten;
-use super::{MassScale, Misreading, numbers_of};
+use super::{MassScale, Misreading, numbers_of, power_of_ten};
 use crate::error::Location;
 use crate::model::parameter::JointField;
 use crate::problem::fixture::carrier_word;
@@ -43,10 +42,7 @@ impl Misreading {
                 let unit = unit_of_ratio(size, kind);
                 format!("joint {joint} that {moves} by {size:.4} times its command{unit}")
             }
-            (Self::Scale { .. }, Some(size)) => format!(
-                "positions that are {size:.4} times as large as the lengths of the joint table say \
-                 (scale factor of the instrument, or a joint table of another size of this arm)"
-            ),
+            (Self::Scale { .. }, Some(size)) => format!("{self}: {size:.4} times as large"),
             (Self::Screw { joint, from, .. }, Some(size)) => format!(
                 "joint {joint} that also turns by {:.3}°/mm of joint {from} (as a ball screw does; declare joint-coupling)",
                 size.to_degrees() * 1e-3
@@ -168,6 +164,15 @@ fn unit_of_ratio(ratio: f64, kind: Option<JointKind>) -> &'static str {
     }
 }
 
+/// Lists the numbers of a set of joints: "1, 2 and 4".
+fn listed_joints(joints: u64) -> String {
+    let numbers: Vec<String> = numbers_of(joints).map(|joint| joint.to_string()).collect();
+    match numbers.as_slice() {
+        [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
+        _ => numbers.concat(),
+    }
+}
+
 impl fmt::Display for MassScale {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -187,17 +192,30 @@ impl fmt::Display for Misreading {
         match *self {
             Self::Degrees => f.write_str("joint angles that are degrees, declared as radians"),
             Self::Radians => f.write_str("joint angles that are radians, declared as degrees"),
-            Self::TurnUnit { hundredths } => {
-                let unit = match hundredths {
-                    90 => "gradians",
-                    10 => "tenths of a degree",
-                    _ => "hundredths of a degree",
-                };
-                write!(f, "joint angles that are {unit}, declared as degrees")
+            Self::TurnUnit { per_turn } => {
+                f.write_str("joint angles that are ")?;
+                match per_turn {
+                    400 => f.write_str("gradians"),
+                    3600 => f.write_str("tenths of a degree"),
+                    36_000 => f.write_str("hundredths of a degree"),
+                    _ => write!(f, "counts of {per_turn} to a turn"),
+                }?;
+                f.write_str(", declared as degrees")
             }
+            Self::MixedUnits { joints, is_radians } => {
+                let [found, declared] =
+                    if is_radians { ["radians", "degrees"] } else { ["degrees", "radians"] };
+                let numbers = listed_joints(joints);
+                write!(f, "joints {numbers} alone that are in {found}, declared as {declared}")
+            }
+            Self::Cycled { joints: [first, second, third] } => write!(
+                f,
+                "columns of joints {first}, {second} and {third} that hold the angles of joints \
+                 {second}, {third} and {first}"
+            ),
             Self::Scale { .. } => f.write_str(
-                "positions on another scale than the joint table (unit or scale factor of the \
-                 instrument, or a joint table of another size of this arm)",
+                "positions on another scale than the joint table (scale factor of the instrument, \
+                 or a joint table of another size of this arm)",
             ),
             Self::OppositeOrder => f.write_str("columns of all joints in the opposite order"),
             Self::Alphabetical => f.write_str(
@@ -220,6 +238,9 @@ impl fmt::Display for Misreading {
             Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
             Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
             Self::Inches => f.write_str("positions that are inches, declared as millimetres"),
+            Self::Centimetres => {
+                f.write_str("positions that are centimetres, declared as millimetres")
+            }
             Self::Mirrored { axes: None } => {
                 f.write_str("two of x, y and z that are exchanged, or one of the other sign")
             }
@@ -232,14 +253,11 @@ impl fmt::Display for Misreading {
                 }
             }
             Self::Reversed { joints } => {
-                let numbers: Vec<String> =
-                    numbers_of(joints).map(|joint| joint.to_string()).collect();
-                match numbers.as_slice() {
-                    [joint] => write!(f, "joint {joint} that counts the other way"),
-                    [first @ .., last] => {
-                        write!(f, "joints {} and {last} that count the other way", first.join(", "))
-                    }
-                    [] => Ok(()),
+                let numbers = listed_joints(joints);
+                if joints.count_ones() > 1 {
+                    write!(f, "joints {numbers} that count the other way")
+                } else {
+                    write!(f, "joint {numbers} that counts the other way")
                 }
             }
             Self::Rotated { by } => {
@@ -309,6 +327,12 @@ impl Misreading {
                 write!(f, "mass {mass}, counted along the arm, that is {scale}")
             }
             Self::Payload { scale } => write!(f, "payloads that are {scale}"),
+            Self::Hoist { is_reversed: false } => {
+                f.write_str("hoist forces that are in kilograms, declared in newtons")
+            }
+            Self::Hoist { is_reversed: true } => {
+                f.write_str("a hoist that pulls the other way (its direction, or the signs of hoist_N)")
+            }
             Self::ShiftedPayload { by } => {
                 let (rows, side) = (by.unsigned_abs(), if by > 0 { "before" } else { "after" });
                 let plural = if rows == 1 { "" } else { "s" };

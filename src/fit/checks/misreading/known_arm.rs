@@ -1,0 +1,68 @@
+//! Search for misreadings of a table of an arm that is known.
+
+use nalgebra::DVector;
+
+use super::Misreading;
+use super::candidates::candidates;
+use super::search::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_RATIO_TO_BEST, MAX_REVERSED};
+use crate::fit::Placement;
+use crate::measurement::Measurements;
+use crate::model::Model;
+use crate::numeric::parallel;
+use crate::problem::Problem;
+
+/// Maximum number of rows, evenly spaced, that are predicted with each misreading.
+const MAX_PREDICTED_ROWS: usize = 12;
+
+/// Returns the misreadings of a `table` of positions with which an arm predicts them far better, and
+/// the rms error that the best one leaves \[m\]. The arm has the full parameter vector `x`. `None` if
+/// no misreading leaves less than [`MAX_CLEAR_RATIO`] of the error.
+pub(crate) fn misread_table(
+    problem: &Problem,
+    (model, x): (&Model, &DVector<f64>),
+    table: &Measurements,
+) -> Option<(String, f64)> {
+    let placement = Placement::of(table);
+    let of_positions: Vec<usize> =
+        (0..table.len()).filter(|&row| table.observation(row).is_position()).collect();
+    let step = of_positions.len().div_ceil(MAX_PREDICTED_ROWS).max(1);
+    let chosen: Vec<usize> = of_positions.into_iter().step_by(step).collect();
+    let error = |misreading: Misreading| {
+        let rows = misreading.undone(table, &chosen, (problem, table.joints));
+        let of_rows = Placement::of(&rows);
+        if of_rows.bases != placement.bases || of_rows.targets != placement.targets {
+            return None;
+        }
+        let every_row: Vec<usize> = (0..rows.len()).collect();
+        let residuals = model.residuals(of_rows.poses(&rows, &every_row, 1.0), x);
+        let squares = residuals.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>();
+        let rms = (squares / residuals.len() as f64).sqrt();
+        rms.is_finite().then_some((misreading, rms))
+    };
+    let reversed = |joints: u64| Misreading::Reversed { joints };
+    let (_, as_read) = error(reversed(0))?;
+    // The estimate contradicts misreadings of the problem, and small zero offsets are changes.
+    let is_of_table = |misreading: &Misreading| {
+        !matches!(misreading, Misreading::Zero { .. } | Misreading::Mirrored { .. })
+            && !misreading.concerns_problem()
+            && misreading.rewritten(problem).is_none()
+    };
+    let mut tested = candidates(problem, table);
+    tested.retain(is_of_table);
+    let axes = (0..3).flat_map(|first| (first..3).map(move |second| Some([first, second])));
+    tested.extend(axes.map(|axes| Misreading::Mirrored { axes }));
+    let sets = 1..1_u64 << table.joints.min(MAX_REVERSED);
+    tested.extend(sets.filter(|joints| joints.count_ones() > 1).map(reversed));
+    let mut errors: Vec<(Misreading, f64)> =
+        parallel::map_items(&tested, |misreading| error(*misreading))
+            .into_iter()
+            .flatten()
+            .collect();
+    errors.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let best = errors.first()?.1;
+    let limit = (MAX_CLEAR_RATIO * as_read).min(MAX_RATIO_TO_BEST * best);
+    let explaining = errors.iter().take_while(|(_, rms)| *rms <= limit).take(MAX_NAMED);
+    let words: Vec<String> =
+        explaining.map(|(misreading, _)| misreading.described(None, problem)).collect();
+    (!words.is_empty()).then(|| (words.join(", or "), best))
+}
