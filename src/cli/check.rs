@@ -60,8 +60,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         &arguments.source.files(),
         &["check.json", "check.html"],
     )?;
-    let check =
-        design::check(&problem, &checked_poses(arguments, &problem)?, arguments.source.seed)?;
+    let poses = checked_poses(arguments, &problem)?;
+    if let CheckedPoses::Table { poses, .. } = &poses {
+        common.hint(poses.still_joints().into_iter().map(|joint| {
+            format!(
+                "joint {} stands still in all poses, so that they do not tell what its other \
+                 coordinates would show; vary it",
+                joint + 1
+            )
+        }));
+    }
+    let check = design::check(&problem, &poses, arguments.source.seed)?;
     let json = CheckResult::new(&problem, &check).to_json();
     let story = report::check(&problem, &check);
     results.write(&[("check.json", &json), ("check.html", &story.page())])?;
