@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::error::InputErrorKind;
+use crate::error::TableErrorKind;
 use crate::fit::{FindingCode, IdentifyError};
 use crate::fit::apply::predict::Residual;
 use crate::fit::apply::tolerance::{Tolerance, ToleranceTest, Verdict};
@@ -13,7 +13,7 @@ use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::Dataset;
 use crate::numeric::{Interval, mean_interval};
-use crate::problem::Problem;
+use crate::problem::{HeldOut, Problem};
 
 /// Number of bootstrap resamples of a confidence interval.
 const RESAMPLES: usize = 5000;
@@ -119,8 +119,12 @@ pub fn held_out_positions(
 ) -> Result<Vec<usize>, IdentifyError> {
     let is_position = |row: &usize| measurements.observation(*row).is_position();
     let rows: Vec<usize> = split.held_out.iter().copied().filter(is_position).collect();
+    let error = |kind| Err(problem.data.held_out_location.clone().error(kind).into());
+    if problem.data.held_out == Some(HeldOut::Nothing) {
+        return error(TableErrorKind::NothingHeldOut);
+    }
     if rows.is_empty() {
-        return Err(problem.data.location.clone().error(InputErrorKind::NoPositionsHeldOut).into());
+        return Err(problem.data.location.clone().error(TableErrorKind::NoPositionsHeldOut).into());
     }
     Ok(rows)
 }
