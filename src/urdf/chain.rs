@@ -304,7 +304,10 @@ fn leaf(
     }
     // The last link above all leaves, where a tool or a gripper branches.
     let path = |link: usize| {
-        let up = |&at: &usize| (at != base).then(|| above[at].map(|(_, parent)| parent)).flatten();
+        let up = |at: &usize| {
+            let above = above.get(*at).copied().flatten().filter(|_| *at != base);
+            above.map(|(_, parent)| parent)
+        };
         std::iter::successors(Some(link), up).collect::<Vec<usize>>()
     };
     let paths: Vec<Vec<usize>> = leaves.iter().map(|&(_, link)| path(link)).collect();
