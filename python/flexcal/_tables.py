@@ -90,7 +90,7 @@ def configurations(
         return source(poses, joints), Shape(single=True, every_joint=False)
     if isinstance(q, (str, os.PathLike, Mapping)) or hasattr(q, "columns") or hasattr(q, "column_names"):
         if columns:
-            raise TypeError("columns go into the table of poses itself")
+            q = _with_columns(q, columns)
         poses = q if argument == "q" else _with_units(argument, q, units, joints)
         return source(poses, joints), Shape(single=False, every_joint=False)
     values = _reals("q", _plain("q", q, "q"))
@@ -110,6 +110,17 @@ def configurations(
         one_each = np.ndim(_plain(name, value, "q")) > 0
         table[name] = value if one_each else np.full(len(values), value)
     return source(table, joints), Shape(single, every_joint)
+
+
+def _with_columns(q: Any, columns: Mapping[str, Any]) -> Any:
+    """A table of poses with further columns; a value of ``columns`` may be one for all rows."""
+    if hasattr(q, "assign"):
+        return q.assign(**columns)
+    if not isinstance(q, Mapping):
+        raise TypeError("columns go into the table of poses itself")
+    rows = max((len(value) for value in q.values()), default=1)
+    spread = {name: value if np.ndim(value) > 0 else np.full(rows, value) for name, value in columns.items()}
+    return {**q, **spread}
 
 
 def _named_values(q: Any) -> dict[str, Any] | None:

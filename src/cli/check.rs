@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use clap::Args;
 use flexcal::design::{self, CheckedPoses};
 use flexcal::measurement::{Dataset, Measurements};
-use flexcal::problem::Problem;
+use flexcal::problem::{Joint, JointKind, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{CheckResult, Document as _};
+use nalgebra::Vector3;
 
 use super::input::Common;
 use super::outcome::Outcome;
@@ -60,6 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         &arguments.source.files(),
         &["check.json", "check.html"],
     )?;
+    common.hint(slides_along_gravity(&problem));
     let poses = checked_poses(arguments, &problem)?;
     let turns = match &poses {
         CheckedPoses::Table { poses, .. } => Common::orientation_line(&problem, poses),
@@ -95,6 +97,22 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     diagnostic::warn(&report::why_not_sufficient(&check));
     Ok(Outcome::NotMet)
+}
+
+/// Largest sine of the angle between two parallel directions.
+const MAX_PARALLEL_SINE: f64 = 1e-3;
+
+/// Returns a warning if the arm has masses and gravity acts along the axis of a first joint that
+/// slides, as it does by default on a level rail, whose direction is the z axis of the base.
+fn slides_along_gravity(problem: &Problem) -> Option<&'static str> {
+    let first = problem.joints.first().filter(|joint| joint.kind == JointKind::Prismatic)?;
+    let has_masses = |joint: &Joint| !joint.bodies.is_empty() || joint.beam.is_some();
+    let (sin, cos) = first.alpha.sin_cos();
+    let across = problem.gravity.cross(&Vector3::new(0.0, -sin, cos)).norm();
+    let is_along = across < MAX_PARALLEL_SINE * problem.gravity.norm();
+    (is_along && problem.joints.iter().any(has_masses)).then_some(
+        "gravity acts along the axis on which joint 1 slides: right for a lift; on a level rail, write gravity_m_s2 as the base frame sees it",
+    )
 }
 
 /// Returns the poses to check that the arguments name, drawn from ranges or read from tables.

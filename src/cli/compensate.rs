@@ -120,7 +120,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // An error of the remainder's file is reported only after errors of the estimate, which explain
     // more.
     correction?;
-    common.hint(estimate.measurement_scale().map(|scale| {
+    common.hint(fit::measurement_scale(&estimate).map(|scale| {
         format!(
             "targets are true positions: the problem says that the measurement reads them {:.3} mm per metre too far apart (tracker-scale); \
              if the arm errs instead, so do the commands",

@@ -249,7 +249,8 @@ fn next_step(
     }
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
-    let lacks = if asked.purpose == Purpose::Causes {
+    // The new rows of an update are too few for a search.
+    let lacks = if asked.prior.is_some() || asked.purpose == Purpose::Causes {
         String::new()
     } else if next.has_large_misfit() && !noise_exceeds {
         let closed = results.path("problem.closed.toml");

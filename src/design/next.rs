@@ -254,13 +254,9 @@ pub fn next(
     let size = MisfitSize::of(&found, has_declared_noise);
     let misfit = (!is_of_cameras).then(|| Misfit::new(&site, &reference, size.misfit, seed));
     let mut unknowns = Unknowns::of(&site.model.parameters);
-    let posterior = options.update.map(|_| posterior_rows(&site, &found, sensitivity.coordinates));
-    if let Some((_, known)) = &posterior {
-        // The posterior contains the priors.
-        for &k in known {
-            unknowns.sigmas[k] = None;
-        }
-    }
+    let coordinates = sensitivity.coordinates;
+    let posterior =
+        options.update.map(|_| posterior_rows(&site, &found, coordinates, &mut unknowns));
     let unknowns = match &misfit {
         Some(misfit) => unknowns.and_standard(misfit.weights()),
         None => unknowns,
@@ -272,7 +268,7 @@ pub fn next(
     };
     let (given_rows, given) = site.in_equilibrium(&measured);
     let given = match posterior {
-        Some((Sensitivity { rows, coordinates }, _)) => {
+        Some(Sensitivity { rows, coordinates }) => {
             Sensitivity { rows: rows.resize_vertically(unknowns.sigmas.len(), 0.0), coordinates }
         }
         None => extended(&given_rows, given, None),

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::exchange::Unknowns;
 use super::{Sensitivity, Site};
 use crate::fit::Identification;
 use crate::numeric::inverse_factor;
@@ -10,8 +11,9 @@ use crate::numeric::inverse_factor;
 /// rounding.
 const JITTER: f64 = 1e-9;
 
-/// Returns rows whose information is that of the posterior of `found` on the parameters of a site,
-/// and the indices of these parameters among those of the site. A pose has `coordinates` rows.
+/// Returns rows whose information is that of the posterior of `found` on the parameters of a site. A
+/// pose has `coordinates` rows. The posterior contains the priors of these parameters, so they are
+/// removed from the `unknowns`.
 ///
 /// With the covariance C = D ρ D and ρ = L Lᵀ, the rows are L⁻¹ D⁻¹: their information is C⁻¹. Without
 /// a covariance there are no rows.
@@ -19,7 +21,8 @@ pub(super) fn posterior_rows(
     site: &Site,
     found: &Identification,
     coordinates: usize,
-) -> (Sensitivity, Vec<usize>) {
+    unknowns: &mut Unknowns,
+) -> Sensitivity {
     let declared = &site.model.parameters;
     let known: Vec<(usize, usize)> = (0..found.estimates.len())
         .filter(|&k| found.covariance.entry(k, k).is_some_and(|variance| variance > 0.0))
@@ -42,14 +45,15 @@ pub(super) fn posterior_rows(
         covariance / (variance(one) * variance(other)).sqrt() + jitter
     });
     let Some(inverse) = inverse_factor(&correlation) else {
-        return (Sensitivity { rows: DMatrix::zeros(declared.len(), 0), coordinates }, Vec::new());
+        return Sensitivity { rows: DMatrix::zeros(declared.len(), 0), coordinates };
     };
     let columns = known.len().next_multiple_of(coordinates);
     let mut rows = DMatrix::zeros(declared.len(), columns);
     for (i, &(_, place)) in known.iter().enumerate() {
+        unknowns.sigmas[place] = None;
         for row in 0..known.len() {
             rows[(place, row)] = inverse[(row, i)] / sigmas[i];
         }
     }
-    (Sensitivity { rows, coordinates }, known.into_iter().map(|(_, place)| place).collect())
+    Sensitivity { rows, coordinates }
 }

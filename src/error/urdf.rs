@@ -71,10 +71,11 @@ pub enum UrdfErrorKind {
     #[error("several links have no parent: {}; choose one with --base", listed(roots))]
     Roots { roots: Vec<String> },
     #[error(
-        "several links end the tree below \"{base}\": {}; choose one with --tip",
-        listed(leaves)
+        "several links end the tree below \"{base}\": {}; choose one with --tip{}",
+        listed(leaves),
+        fork.as_ref().map_or_else(String::new, |link| format!(", or {link}, which carries all of them"))
     )]
-    Leaves { base: String, leaves: Vec<String> },
+    Leaves { base: String, leaves: Vec<String>, fork: Option<String> },
     #[error("link \"{tip}\" is not below link \"{base}\", but above it; exchange --base and --tip")]
     EndsExchanged { base: String, tip: String },
     #[error(

@@ -15,6 +15,9 @@ use crate::problem::Problem;
 
 /// Relative difference up to which two σ count as equal.
 pub(super) const EQUAL_SIGMA: f64 = 1e-6;
+/// Standard deviation (1 σ) assumed for the deviation of a parameter without any prior: \[m\],
+/// \[rad\], or of a logarithm.
+pub(super) const WIDE_SIGMA: f64 = 1.0;
 
 /// Gaussian distribution of some parameters of a model, from an earlier estimate or from siblings,
 /// widened by drift.

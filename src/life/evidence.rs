@@ -23,6 +23,8 @@ pub(super) const NOISE_RATIOS: [f64; 4] = [1.5, 2.0, 3.0, 5.0];
 /// Ratios of the errors to the assumed noise that are tried for the cause "something else": errors
 /// without a pattern that are too large to be noise.
 pub(super) const OTHER_RATIOS: [f64; 5] = [30.0, 300.0, 3e3, 3e4, 3e5];
+/// Smallest probability at which the most probable cause is named as the cause.
+pub(super) const MIN_NAMED_PROBABILITY: f64 = 0.9;
 /// Prior odds that two things changed together, against one thing alone.
 pub(super) const SECOND_CHANGE_ODDS: f64 = 0.05;
 /// Standard deviations λ of a gross row's error that are tried, in units of the row's σ.

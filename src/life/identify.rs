@@ -11,7 +11,7 @@ use super::assessment::{Assessment, assess};
 use super::causes::{Cause, CauseKind, Extended};
 use super::contradiction::{self, Contradiction, most_probable};
 use super::drift;
-use super::earlier::Earlier;
+use super::earlier::{Earlier, WIDE_SIGMA};
 use super::error::PriorError;
 use super::evidence::factor;
 use super::fleet_file::FleetPrior;
@@ -44,9 +44,6 @@ const MIN_LEARNED: f64 = 1e-3;
 /// Distance of a bound from the mean of the prior, in standard deviations of the prior, beyond
 /// which an estimate at the bound contradicts the prior.
 const BOUND_SIGMAS: f64 = 3.0;
-/// Standard deviation (1 σ) assumed for the deviation of a parameter without any prior: \[m\],
-/// \[rad\], or of a logarithm.
-pub(super) const WIDE_SIGMA: f64 = 1.0;
 
 /// Source of the prior of an identification.
 #[derive(Debug, Clone)]
@@ -328,15 +325,18 @@ fn contradicting_evidence(assessed: &Assessment) -> Option<f64> {
     (evidence > CONTRADICTION_RATIO.ln()).then_some(evidence.max(assessed.ln_sum))
 }
 
-/// Returns the assessment with pairs of causes if the rows contradict the earlier estimate, and
-/// unchanged otherwise; `None` if a number is not finite.
+/// Returns the assessment with pairs of causes if the rows contradict the earlier estimate and no
+/// single change of the arm is the most probable cause, and unchanged otherwise: a single change is
+/// fitted first, and the rows are tested again. `None` if a number is not finite.
 fn paired(
     assessed: Assessment,
     rows: &SensitiveRows,
     factor: &DMatrix<f64>,
     causes: &mut Vec<Cause>,
 ) -> Option<Assessment> {
-    if contradicting_evidence(&assessed).is_none() {
+    let first = assessed.causes.first().map(|first| &causes[first.cause]);
+    let is_of_arm = first.is_some_and(|cause| !cause.columns.is_empty());
+    if is_of_arm || contradicting_evidence(&assessed).is_none() {
         return Some(assessed);
     }
     with_pairs(assessed, rows, factor, causes)

@@ -46,7 +46,8 @@ pub(super) fn with_onsets(
     let ln_prior = WITHIN_PROBABILITY.ln() - (onsets.len().max(1) as f64).ln();
     for &onset in &onsets {
         let (masked, columns) = rows.masked_before(onset, &every_column);
-        let unchanged = Unchanged::new(&sums_of(&masked), &padded_factor(factor, columns.len()))?;
+        let unchanged =
+            Unchanged::new(&sums_of(&masked, 1.0), &padded_factor(factor, columns.len()))?;
         for (assessed, of_cause) in assessment.causes.iter().zip(&mut hypotheses) {
             let found = weighted_cause(&unchanged, &causes[assessed.cause], &columns);
             if let Some(found) = found.filter(|_| has_onset(assessed)) {
@@ -68,9 +69,9 @@ pub(super) fn with_onsets(
     Some(Assessment { causes: found, ln_sum: assessment.ln_sum + all, ..assessment })
 }
 
-/// Returns the sums over all rows, for the assumed noise.
-pub(super) fn sums_of(rows: &SensitiveRows) -> Sums {
-    let mut sums = Sums::new(rows.sensitivity.ncols(), 1.0);
+/// Returns the sums over all rows, for noise that is `ratio` times the assumed one.
+pub(super) fn sums_of(rows: &SensitiveRows, ratio: f64) -> Sums {
+    let mut sums = Sums::new(rows.sensitivity.ncols(), ratio);
     (0..rows.len()).for_each(|row| sums.add(rows, row, 1.0));
     sums
 }

@@ -4,15 +4,17 @@ use nalgebra::DMatrix;
 
 use super::assessment::{AssessedCause, Assessment, Weighted, weighted_cause};
 use super::causes::{Cause, CauseKind, Trial};
-use super::evidence::{SECOND_CHANGE_ODDS, Unchanged, ln_sum};
+use super::evidence::{MIN_NAMED_PROBABILITY, NOISE_RATIOS, SECOND_CHANGE_ODDS, Unchanged, ln_sum};
 use super::onset::sums_of;
 use super::rows::SensitiveRows;
 
 /// Maximum number of causes of which all pairs are tried: those with the largest evidence.
 const MAX_PAIRED_CAUSES: usize = 40;
 
-/// Returns the assessment with the pairs of `causes`, if the pairs together are more probable than
-/// all single causes, and unchanged otherwise. The pairs are appended to `causes`.
+/// Returns the assessment with the pairs of `causes`, if the pairs together are nine times as
+/// probable as all single causes, alone or with larger noise, and unchanged otherwise: what a model
+/// lacks looks like noise, and a second cause would fit a part of it. The pairs are appended to
+/// `causes`.
 ///
 /// All pairs have the prior odds [`SECOND_CHANGE_ODDS`] together, and each pair has a share in
 /// proportion to the product of the prior probabilities of its causes. The evidence for a change, and
@@ -33,7 +35,7 @@ pub(super) fn with_pairs(
         .flat_map(|(place, a)| paired[..place].iter().map(|b| pair(b, a)))
         .collect();
     let all = ln_sum(pairs.iter().map(|pair| pair.ln_weight));
-    let unchanged = Unchanged::new(&sums_of(rows), factor)?;
+    let unchanged = Unchanged::new(&sums_of(rows, 1.0), factor)?;
     let every_column: Vec<usize> = (0..rows.sensitivity.ncols()).collect();
     let mut found: Vec<(usize, Weighted)> = Vec::new();
     for (place, pair) in pairs.iter_mut().enumerate() {
@@ -42,7 +44,20 @@ pub(super) fn with_pairs(
         found.extend(weighted.map(|weighted| (causes.len() + place, weighted)));
     }
     let of_pairs = ln_sum(found.iter().map(|(_, weighted)| weighted.ln_share));
-    if of_pairs <= assessment.ln_sum {
+    let noise = causes.iter().find(|cause| cause.kind == CauseKind::Noise);
+    let ln_prior = noise.map_or(f64::NEG_INFINITY, |noise| noise.ln_weight)
+        + SECOND_CHANGE_ODDS.ln()
+        - all
+        - (NOISE_RATIOS.len() as f64).ln();
+    let with_noise = NOISE_RATIOS.iter().filter_map(|&ratio| {
+        let noisier = Unchanged::new(&sums_of(rows, ratio), factor)?;
+        let of_cause = |cause: &&Cause| weighted_cause(&noisier, cause, &every_column);
+        let shares = paired.iter().filter_map(of_cause).map(|weighted| weighted.ln_share);
+        Some(ln_sum(shares) + unchanged.against(&noisier) + ln_prior)
+    });
+    let others = ln_sum(with_noise.chain([assessment.ln_sum]));
+    let odds = MIN_NAMED_PROBABILITY / (1.0 - MIN_NAMED_PROBABILITY);
+    if of_pairs < others + odds.ln() {
         return Some(assessment);
     }
     let sum = ln_sum([assessment.ln_sum, of_pairs]);

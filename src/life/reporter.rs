@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::assessment::AssessedCause;
 use super::causes::{Cause, CauseKind};
-use super::evidence::Unchanged;
-use super::identify::WIDE_SIGMA;
+use super::earlier::WIDE_SIGMA;
+use super::evidence::{MIN_NAMED_PROBABILITY, Unchanged};
 use super::onset::{padded_factor, sums_of};
 use super::rows::SensitiveRows;
 use crate::quantity::Unit;
@@ -15,9 +15,6 @@ const MAX_GROUPS: usize = 60;
 /// Smallest expected evidence per pose for one cause against another \[nats\] at which more poses
 /// can distinguish the causes.
 const MIN_NATS_PER_POSE: f64 = 1e-3;
-
-/// Smallest probability at which the most probable cause is named as the cause.
-pub(super) const MIN_NAMED_PROBABILITY: f64 = 0.9;
 
 /// Cause of a change with its probability and size.
 #[derive(Debug, Clone)]
@@ -182,7 +179,7 @@ impl Reporter<'_> {
         let unknown = vec![WIDE_SIGMA; self.unknown.len()];
         let sizes = [&*assessed.sizes, &unknown, &vec![1.0; carried.len()]].concat();
         let factor = DMatrix::zeros(rows.sensitivity.ncols(), 1);
-        let sums = sums_of(rows);
+        let sums = sums_of(rows, 1.0);
         let groups = rows.len().min(MAX_GROUPS);
         let means: Option<Vec<DVector<f64>>> = (0..groups)
             .map(|group| {
@@ -219,7 +216,7 @@ impl Reporter<'_> {
         let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
         let (rows, of_rival) = rows.masked_before(rival.onset, &other.columns);
         let factor = padded_factor(self.factor, columns.len() + of_rival.len());
-        let unchanged = Unchanged::new(&sums_of(&rows), &factor)?;
+        let unchanged = Unchanged::new(&sums_of(&rows, 1.0), &factor)?;
         let part = |a: &[usize], b: &[usize]| {
             DMatrix::from_fn(a.len(), b.len(), |i, j| unchanged.information[(a[i], b[j])])
         };

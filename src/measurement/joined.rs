@@ -12,7 +12,7 @@ use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
 use super::spelling::{quoted, same_but_for_spelling};
 use super::table::{Table, shortened};
 use super::time::shown;
-use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
+use crate::error::{InputError, Location, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Dialect, JoinRule, JointLog, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::two_digits;
@@ -109,14 +109,7 @@ impl JoinedLog {
         let dialect = &problem.data.dialect;
         let mut joined = Self { rule: log.by, location: log.location.clone(), ..Self::default() };
         for file in &log.files {
-            let missing = || {
-                if log.is_given {
-                    return Location::file(file).error(InputErrorKind::GivenFileMissing);
-                }
-                let kind = InputErrorKind::DataFileMissing { path: file.clone() };
-                log.location.clone().error(kind)
-            };
-            joined.read_file(Table::open(file, dialect, missing)?, dialect)?;
+            joined.read_file(Table::open(file, dialect, || log.missing(file))?, dialect)?;
         }
         let mut by_time: Vec<usize> = (0..joined.rows.len()).collect();
         let time = |row: &usize| joined.rows.get(*row).map_or(f64::NAN, |row| row.time);

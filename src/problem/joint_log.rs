@@ -22,6 +22,17 @@ pub struct JointLog {
     pub is_given: bool,
 }
 
+impl JointLog {
+    /// Returns the error that one of its files does not exist.
+    pub fn missing(&self, file: &Path) -> InputError {
+        if self.is_given {
+            return Location::file(file).error(InputErrorKind::GivenFileMissing);
+        }
+        let kind = InputErrorKind::DataFileMissing { path: file.to_owned() };
+        self.location.clone().error(kind)
+    }
+}
+
 /// Rule that pairs the rows of two tables.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum JoinRule {

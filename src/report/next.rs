@@ -20,8 +20,9 @@ pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story
     let percent = number(options.level * 100.0, 1);
     let percent = percent.trim_end_matches(".0");
     let counts = format!(
-        "{} fitted; {}; predictions judged at {}",
+        "{} {}; {}; predictions judged at {}",
         counted(next.measured, "row"),
+        if options.update.is_some() { "added to the earlier estimate" } else { "fitted" },
         candidates_drawn(next.candidates, next.drawn, options.workspace.is_some()),
         counted(next.workspace_poses, "pose"),
     );

@@ -302,6 +302,18 @@ fn leaf(
     {
         return Ok((leaf, leaves.iter().skip(1).map(named).collect()));
     }
+    // The last link above all leaves, where a tool or a gripper branches.
+    let path = |link: usize| {
+        let up = |at: &usize| {
+            let above = above.get(*at).copied().flatten().filter(|_| *at != base);
+            above.map(|(_, parent)| parent)
+        };
+        std::iter::successors(Some(link), up).collect::<Vec<usize>>()
+    };
+    let paths: Vec<Vec<usize>> = leaves.iter().map(|&(_, link)| path(link)).collect();
+    let is_common = |link: &&usize| paths.iter().all(|path| path.contains(link));
+    let fork = paths.first().and_then(|path| path.iter().find(is_common)).copied();
+    let fork = fork.filter(|&link| link != base).map(|link| robot.link_name(link));
     let (base, leaves) = (robot.link_name(base), leaves.iter().map(named).collect());
-    Err(robot.error(UrdfErrorKind::Leaves { base, leaves }))
+    Err(robot.error(UrdfErrorKind::Leaves { base, leaves, fork }))
 }

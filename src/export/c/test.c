@@ -111,8 +111,8 @@ int main(void)
     }
     correct_us = 1e6 * (double)(clock() - start) / CLOCKS_PER_SEC / (corrected > 0 ? corrected : 1);
     (void)printf("%d poses: positions within %.1e m, axes within %.1e, %.2f us a pose\n", ROWS, position, axis, forward_us);
-    (void)printf("%d commands: within %.1e rad or m, %.1f us a command; %d near singular poses take more steps\n",
-        compared, command, correct_us, unsettled);
+    (void)printf("%d commands: within %.1e rad or m, %.1f us a command; %d near singular poses take more steps, %d targets are not compared (out of reach)\n",
+        compared, command, correct_us, unsettled, ROWS - compared - unsettled);
     if (failed > 0 || !(position <= MAX_POSITION) || !(axis <= MAX_AXIS) || !(command <= MAX_COMMAND)
         || unsettled > (compared + unsettled) / MAX_UNSETTLED) {
         (void)printf("FAILED: %d without an answer (allowed: 0), %d of %d commands near singular poses (allowed: every %dth), "

@@ -60,17 +60,17 @@ pub struct SavedEstimate {
     pub(crate) arm_parts: BTreeMap<String, String>,
     /// Strategy of the fit.
     pub strategy: Strategy,
-    parameters: Vec<Entry>,
+    pub(super) parameters: Vec<Entry>,
     /// Uncertainty and noise of the estimate.
     pub(crate) posterior: SavedPosterior,
 }
 
 /// Parameter of the file.
 #[derive(Debug, Clone, Deserialize)]
-struct Entry {
-    name: String,
+pub(super) struct Entry {
+    pub name: String,
     nominal: f64,
-    estimate: f64,
+    pub estimate: f64,
     /// Standard error of the value, SI; `None` if it has none, or in files of older versions.
     std_error: Option<f64>,
     identified: Option<f64>,
@@ -283,14 +283,6 @@ impl SavedEstimate {
     #[must_use]
     pub(crate) fn model(&self, declared: Model) -> Model {
         self.strategy.model(declared)
-    }
-
-    /// Returns the identified relative error of measured lengths; `None` if the problem declares no
-    /// `tracker-scale`.
-    #[doc(hidden)]
-    pub fn measurement_scale(&self) -> Option<f64> {
-        let is_scale = |entry: &&Entry| entry.name.starts_with("tracker-scale");
-        self.parameters.iter().find(is_scale).map(|entry| entry.estimate)
     }
 
     /// Sets the elapsed times of `poses` to those since the start of their session in the
