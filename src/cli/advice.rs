@@ -33,8 +33,12 @@ const INPUT_MISTAKES: [FindingCode; 6] = [
 ];
 
 /// Findings that name rows or columns of the table that are wrong.
-const CORRECTED_IN_TABLE: [FindingCode; 3] =
-    [FindingCode::ColumnDoubted, FindingCode::RowsDoubted, FindingCode::CommandsRounded];
+const CORRECTED_IN_TABLE: [FindingCode; 4] = [
+    FindingCode::ColumnDoubted,
+    FindingCode::RowsDoubted,
+    FindingCode::CommandsRounded,
+    FindingCode::ViewsReversed,
+];
 
 /// Returns what to do after a fit, as a command or in words. `is_structured` is true if the
 /// residual tests detect structure; `estimate` is the path of the estimate.json that was written.

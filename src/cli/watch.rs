@@ -46,7 +46,7 @@ fn drift_argument(days: f64) -> String {
 /// Returns a warning that the rows were measured days after the rows of the estimate, if both have
 /// dates; `None` if less than a day lies between them.
 fn age(estimate: &SavedEstimate, rows: &Measurements) -> Option<String> {
-    let days = estimate.days_until(rows)?.round();
+    let days = estimate.start_times.as_ref()?.days_until(rows)?.round();
     (days >= 1.0).then(|| {
         format!(
             "these rows were measured {days} days after those of the estimate; --drift {days} allows for what changes in that time without \
