@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     });
     let test = tolerance.map(|tolerance| judged.test(tolerance));
     if let Some(test) = &test {
-        result = result.with_tolerance(test);
+        result = result.with_tolerance(test, &judged);
     }
     let (json, page) = (result.to_json(), report::acceptance_page(&problem, &result));
     results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
@@ -123,6 +123,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let verdict = result.tolerance.as_ref().map(|tested| tested.verdict);
         let next = if !found.is_trusted() {
             format!("flexcal identify {} says what to correct", common.problem_arguments())
+        } else if judged.are_poses_fitted {
+            "hold out poses that are not fitted, as held_out = { fraction = 0.3, seed = 1 } does, then the same command again"
+                .to_owned()
         } else if verdict == Some(Verdict::Fail.as_str()) {
             let page = page.display();
             format!(

@@ -244,6 +244,9 @@ fn next_step(
         return format!("flexcal identify {arguments} says why the fit is not to be trusted");
     }
     let flags = asked.flags();
+    if !next.found.is_trusted() && next.stop.is_none() {
+        return format!("flexcal identify {arguments} says what to correct");
+    }
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
     let lacks = if asked.purpose == Purpose::Causes {

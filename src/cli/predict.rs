@@ -133,10 +133,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
+    let lost = prediction.lost_rows();
     common.print_result(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
         let text = story.text();
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let next = match (&arguments.estimate, &estimate) {
+            _ if let Some(&first) = lost.first() => format!(
+                "correct the loads (payload_kg, hoist_N) of {} rows without equilibrium, the first at {}, then the same command",
+                lost.len(),
+                rows.location(first)
+            ),
             (Some(file), _) if fitted.is_empty() && test.is_some_and(|of| of.is_contradicted()) => format!(
                 "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than foreseen lie within their bounds",
                 common.problem_arguments(),
@@ -158,7 +164,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let folder = results.folder.display();
         format!("{text}\nWritten to {folder}: {}\nNext: {next}\n", names.join(", "))
     })?;
-    Ok(Outcome::from_trust(trusted))
+    Ok(Outcome::from_trust(trusted && lost.is_empty()))
 }
 
 /// Returns a warning if all measured positions of one session are off by nearly the same vector.

@@ -129,9 +129,8 @@ pub(super) fn attribute_to_prior(findings: &mut [Finding], file: &Path, chi2: Op
             FindingCode::BeyondPrior => {
                 finding.text =
                     format!("the new rows contradict the prior {}{chi2}", file.display());
-                finding.remedy = "these rows are of another arm, or it has changed; fit without \
-                                  --prior"
-                    .to_owned();
+                "these rows are of another arm, or it has changed; fit without --prior"
+                    .clone_into(&mut finding.remedy);
             }
             FindingCode::HeldOutWorse
             | FindingCode::HeldOutBeyondPrediction
@@ -139,8 +138,8 @@ pub(super) fn attribute_to_prior(findings: &mut [Finding], file: &Path, chi2: Op
             | FindingCode::HeldOutOutliers
             | FindingCode::NoiseBeyondDeclared
             | FindingCode::ResidualBeyondDeclared => {
-                finding.remedy =
-                    "the contradicted prior may cause that: fit without --prior".to_owned();
+                "the contradicted prior may cause that: fit without --prior"
+                    .clone_into(&mut finding.remedy);
             }
             _ => {}
         }

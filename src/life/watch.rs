@@ -15,6 +15,7 @@ use super::pairs::with_pairs;
 use super::relocation::{self, LocatedAnew, Placed};
 use super::reporter::{Change, MIN_NAMED_PROBABILITY, Reporter, WatchedCause};
 use super::rows::{SensitiveRows, SharedMisfit, warmth};
+use crate::error::InputErrorKind;
 use crate::fit::{self, Placement, SavedEstimate, register};
 use crate::measurement::Measurements;
 use crate::model::parameter::ParameterSite;
@@ -145,7 +146,12 @@ pub fn watch(
     let placement = Placement::of(&kept);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let earlier = Earlier::of_estimate(estimate, problem, &model, days)?;
-    let x = fit::predict(problem, Some(estimate), &kept, None)?.x;
+    let predicted = fit::predict(problem, Some(estimate), &kept, None)?;
+    if let [first, others @ ..] = predicted.lost_rows().as_slice() {
+        let kind = InputErrorKind::LoadsTooLarge { others: others.len() };
+        return Err(kept.location(*first).error(kind).into());
+    }
+    let x = predicted.x;
     let every_row: Vec<usize> = (0..kept.len()).collect();
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
     let known = KnownNoise::of(problem, estimate);

@@ -117,6 +117,11 @@ pub fn tolerance_text(test: &TestedTolerance) -> String {
             "Fail: fewer than {share} of the poses err by no more than {tolerance}. The risk that this is \
              wrong is at most {risk}; {beyond}, so at most {most} are within the tolerance."
         )
+    } else if let Some(reason) = test.no_test {
+        format!(
+            "Undecided: {reason}, so they do not test whether {share} of the poses err by no more than \
+             {tolerance}; {beyond}."
+        )
     } else {
         let needed = test.poses_to_pass.map_or_else(String::new, |needed| {
             let more = needed.saturating_sub(test.poses);

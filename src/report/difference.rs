@@ -379,6 +379,13 @@ fn notes([a, b]: [&SavedEstimate; 2], shared: usize) -> Vec<String> {
             counted(shared, "common row")
         ));
     }
+    if a.strategy != b.strategy {
+        let [of_a, of_b] = [a, b].map(|estimate| estimate.strategy.as_str());
+        notes.push(format!(
+            "A was fitted with strategy {of_a}, B with strategy {of_b}, so that \
+             parameters can differ for that reason alone."
+        ));
+    }
     notes
 }
 

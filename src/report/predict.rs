@@ -29,11 +29,7 @@ pub(crate) fn prediction(
         _ => counted(count, "pose"),
     };
     let mut words = format!("{rows} predicted for {arm}");
-    let lost = prediction
-        .positions
-        .iter()
-        .filter(|position| !position.iter().all(|x| x.is_finite()))
-        .count();
+    let lost = prediction.lost_rows().len();
     if lost > 0 {
         let _ = write!(words, "; {lost} of them have no equilibrium");
     }
@@ -69,7 +65,7 @@ pub(crate) fn prediction(
     }
     // If base or tool are fitted to these rows, a few rows do not test the bounds.
     blocks.extend(fitted_rows_sentence(prediction, fitted).map(Block::Text));
-    blocks.extend(compared.map(|compared| {
+    blocks.extend(compared.filter(|_| lost == 0).map(|compared| {
         let suffices = 3 * compared.errors.len() > prediction.placed.len();
         let measured = Some(compared).filter(|_| suffices && contradiction.is_none());
         Block::lines(bound_sentence(compared.bounds, &[], measured))

@@ -336,10 +336,11 @@ pub(super) fn bound_sentence(
         let poses = counted(beyond.len(), "pose");
         let lie = if beyond.len() == 1 { "lies" } else { "lie" };
         let _ = write!(words, " {poses} {lie} outside the range of the fitted poses");
-        words += &if within.is_empty() {
-            ", where errors may be larger.".to_owned()
+        let _ = if within.is_empty() {
+            write!(words, ", where errors may be larger.")
         } else {
-            format!(": {} mm rms there, bound {} mm.", shown(expected(&beyond)), bound(&beyond))
+            let (rms, bound) = (shown(expected(&beyond)), bound(&beyond));
+            write!(words, ": {rms} mm rms there, bound {bound} mm.")
         };
     }
     let test = compared.and_then(|compared| compared.test);

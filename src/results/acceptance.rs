@@ -92,7 +92,7 @@ pub struct CoveredBound {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct TestedTolerance {
     /// `pass`, `fail`, or `undecided` if the poses are too few, or if a base or tool was fitted to
-    /// the held-out rows, which then do not test the arm.
+    /// the held-out rows or the arm to their poses, which then do not test the arm.
     pub verdict: &'static str,
     pub tolerance_mm: f64,
     /// Share of the poses that must be within the tolerance.
@@ -108,11 +108,15 @@ pub struct TestedTolerance {
     /// Number of poses at which the test would pass if no more poses than now were beyond the
     /// tolerance; null above a million.
     pub poses_to_pass: Option<usize>,
+    /// Reason for which the held-out poses do not test the arm; `None` if they do.
+    #[serde(skip)]
+    pub(crate) no_test: Option<&'static str>,
 }
 
-impl From<&ToleranceTest> for TestedTolerance {
-    fn from(test: &ToleranceTest) -> Self {
+impl TestedTolerance {
+    fn new(test: &ToleranceTest, no_test: Option<&'static str>) -> Self {
         Self {
+            no_test,
             verdict: test.verdict.as_str(),
             tolerance_mm: test.tolerance.length * 1e3,
             share: test.tolerance.share,
@@ -189,7 +193,7 @@ impl AcceptanceResult {
             inputs: record.inputs.iter().map(input).collect(),
             instrument: record.instrument.clone(),
             position_sigma_mm: problem.data.position_sigma.map(|sigma| sigma * 1e3),
-            protocol: protocol(problem),
+            protocol: protocol(problem, judged),
             strategy: found.strategy.as_str(),
             solver: found.solver.as_str(),
             trusted: found.is_trusted(),
@@ -225,15 +229,15 @@ impl AcceptanceResult {
         Self { remainder, bound: Some(bound), ..self }
     }
 
-    /// Returns the record with the test of a tolerance.
+    /// Returns the record with the test of a tolerance by the `judged` poses.
     #[must_use]
-    pub fn with_tolerance(self, test: &ToleranceTest) -> Self {
-        Self { tolerance: Some(test.into()), ..self }
+    pub fn with_tolerance(self, test: &ToleranceTest, judged: &Acceptance) -> Self {
+        Self { tolerance: Some(TestedTolerance::new(test, judged.no_test())), ..self }
     }
 }
 
 /// Describes how the held-out poses were chosen.
-fn protocol(problem: &Problem) -> String {
+fn protocol(problem: &Problem, judged: &Acceptance) -> String {
     let chosen = match &problem.data.held_out {
         Some(HeldOut::Fraction { fraction, seed }) => {
             format!(
@@ -248,7 +252,12 @@ fn protocol(problem: &Problem) -> String {
         Some(HeldOut::Column(name)) => format!("rows that the column {name} marks as validation"),
         _ => "rows that the column split marks as validation".to_owned(),
     };
-    format!("held out: {chosen}; they took part in no fit of the arm and in no choice")
+    let scope = if judged.are_poses_fitted {
+        "the arm was fitted to other measurements of these poses"
+    } else {
+        "they took part in no fit of the arm and in no choice"
+    };
+    format!("held out: {chosen}; {scope}")
 }
 
 /// Returns the range of each quantity over the held-out poses: commands, measured positions, and

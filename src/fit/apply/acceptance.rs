@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::error::InputErrorKind;
-use crate::fit::IdentifyError;
+use crate::error::TableErrorKind;
 use crate::fit::apply::predict::Residual;
 use crate::fit::apply::tolerance::{Tolerance, ToleranceTest, Verdict};
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
+use crate::fit::{FindingCode, IdentifyError};
 use crate::measurement::Dataset;
 use crate::numeric::{Interval, mean_interval};
-use crate::problem::Problem;
+use crate::problem::{HeldOut, Problem};
 
 /// Number of bootstrap resamples of a confidence interval.
 const RESAMPLES: usize = 5000;
@@ -36,6 +36,8 @@ pub struct Acceptance {
     /// True if a base or tool that only held-out rows use was fitted to these rows. They are then
     /// no test of a tolerance.
     pub is_placed_anew: bool,
+    /// True if the arm was fitted to most of the poses. They are then no test of a tolerance.
+    pub are_poses_fitted: bool,
     /// Accuracy of the registered nominal arm.
     pub before: Accuracy,
     /// Accuracy of the identified arm.
@@ -45,13 +47,21 @@ pub struct Acceptance {
 impl Acceptance {
     /// Tests a tolerance on the accuracies AP of the identified arm in all poses. Each row without
     /// a prediction is a pose beyond the tolerance. If a base or tool was fitted to the held-out
-    /// rows, the verdict is undecided.
+    /// rows, or the arm to most of their poses, the verdict is undecided.
     pub fn test(&self, tolerance: Tolerance) -> ToleranceTest {
         let lost = std::iter::repeat_n(f64::NAN, self.lost);
         let errors: Vec<f64> = self.poses.iter().map(|pose| pose.after).chain(lost).collect();
         let tested = tolerance.test(&errors);
-        let verdict = if self.is_placed_anew { Verdict::Undecided } else { tested.verdict };
+        let verdict = self.no_test().map_or(tested.verdict, |_| Verdict::Undecided);
         ToleranceTest { verdict, ..tested }
+    }
+
+    /// Returns the reason for which the held-out poses do not test a tolerance; `None` if they do.
+    pub(crate) fn no_test(&self) -> Option<&'static str> {
+        if self.are_poses_fitted {
+            return Some("the arm was fitted to the poses that are held out");
+        }
+        self.is_placed_anew.then_some("a base or tool was fitted to the held-out poses")
     }
 }
 
@@ -109,8 +119,12 @@ pub fn held_out_positions(
 ) -> Result<Vec<usize>, IdentifyError> {
     let is_position = |row: &usize| measurements.observation(*row).is_position();
     let rows: Vec<usize> = split.held_out.iter().copied().filter(is_position).collect();
+    let error = |kind| Err(problem.data.held_out_location.clone().error(kind).into());
+    if problem.data.held_out == Some(HeldOut::Nothing) {
+        return error(TableErrorKind::NothingHeldOut);
+    }
     if rows.is_empty() {
-        return Err(problem.data.location.clone().error(InputErrorKind::NoPositionsHeldOut).into());
+        return Err(problem.data.location.clone().error(TableErrorKind::NoPositionsHeldOut).into());
     }
     Ok(rows)
 }
@@ -188,6 +202,7 @@ pub fn acceptance(
         poses,
         lost,
         is_placed_anew,
+        are_poses_fitted: found.has(FindingCode::HeldOutPosesFitted),
     })
 }
 

@@ -58,6 +58,15 @@ pub struct Prediction {
     pub x: DVector<f64>,
 }
 
+impl Prediction {
+    /// Returns the indices of the rows in which the arm has no equilibrium.
+    #[doc(hidden)]
+    pub fn lost_rows(&self) -> Vec<usize> {
+        let is_lost = |position: &Vector3<f64>| !position.iter().all(|x| x.is_finite());
+        (0..self.positions.len()).filter(|&row| is_lost(&self.positions[row])).collect()
+    }
+}
+
 /// Summaries of the errors of all rows, of each kind of rows, and of each session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorsBySession {

@@ -88,18 +88,16 @@ pub(super) fn poses_from_views(
             let is_of_pair =
                 |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
             let of_pair: Vec<&View> = views.iter().filter(is_of_pair).collect();
-            let solve = |views: &[&View]| match located.get(&view.camera) {
-                Some(camera) => {
+            let solve = |views: &[&View]| {
+                if let Some(camera) = located.get(&view.camera) {
                     let marker = |view: &&View| view.carrier * camera * view.marker_in_camera;
-                    [*camera, mean_pose(views.iter().map(marker))]
+                    return [*camera, mean_pose(views.iter().map(marker))];
                 }
-                None => {
-                    let marker = located.get(&view.marker).copied().unwrap_or_default();
-                    let camera = |view: &&View| {
-                        view.carrier.inverse() * marker * view.marker_in_camera.inverse()
-                    };
-                    [mean_pose(views.iter().map(camera)), marker]
-                }
+                let marker = located.get(&view.marker).copied().unwrap_or_default();
+                let camera = |view: &&View| {
+                    view.carrier.inverse() * marker * view.marker_in_camera.inverse()
+                };
+                [mean_pose(views.iter().map(camera)), marker]
             };
             let [camera, marker] =
                 agreed(&of_pair, 1, |views| Some(solve(views))).unwrap_or_else(|| solve(&of_pair));
