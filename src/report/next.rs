@@ -71,7 +71,7 @@ fn error_paragraph(next: &NextPoses, percent: &str) -> String {
             mm(error.bound, 3),
             next.attainable
                 .map(|least| format!(
-                    " As far as these rows tell, no number of further poses brings the rms below {} mm or the bound below {} mm.",
+                    " As far as these rows tell, further poses alone bring the rms to about {} mm at best, and the bound to about {} mm.",
                     mm(least, 3),
                     mm(attainable_bound(&error), 3)
                 ))
