@@ -391,12 +391,10 @@ fn next_command(
             shell_word(path)
         );
     }
-    let whole = if report::holds_whole_model(result) {
-        ""
+    let what = if report::holds_whole_model(result) {
+        "new measurements"
     } else {
-        " of the whole model, not of this file"
+        "the whole model, not this file"
     };
-    format!(
-        "flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges predictions{whole} by new measurements"
-    )
+    format!("flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges {what}")
 }

@@ -26,7 +26,7 @@ const SETTING_STEP: f64 = 0.1;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Extremes {
-    /// Every quantity is uniform within its range.
+    /// Poses are drawn uniformly: every joint, load and temperature within its range.
     No,
     /// Every quantity is at one of its limits with probability one half.
     Often,
@@ -175,7 +175,7 @@ struct Draft {
     covariates: Vec<f64>,
     /// For each joint, true if its column `approach` is 1, false if it is −1.
     sides: Vec<bool>,
-    /// Index of the measured target.
+    /// Index of the target of the tool that is measured in this pose, from 0.
     target: usize,
 }
 

@@ -53,7 +53,7 @@ pub enum CheckedPoses {
 pub enum PredictionPoses {
     /// Poses drawn uniformly from the ranges.
     Ranges,
-    /// Held-out rows of the table.
+    /// Held-out rows of the table whose other rows are checked.
     HeldOut,
     /// The checked poses themselves.
     Same,
@@ -84,7 +84,7 @@ pub struct Check {
     pub coordinates: usize,
     /// Number of coordinates that the checked poses measure, counting each distinct pose once.
     pub distinct_coordinates: usize,
-    /// Number of distinct poses.
+    /// Number of checked poses that differ from one another.
     pub distinct_poses: usize,
     /// Number of free parameters without a prior.
     pub without_prior: usize,

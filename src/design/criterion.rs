@@ -41,7 +41,7 @@ pub enum Criterion {
 pub(super) struct ScaledCriterion {
     /// Indices of the unknowns whose errors are measured, in ascending order.
     pub wanted: Vec<usize>,
-    /// Indices of the other unknowns.
+    /// Indices of the unknowns that are estimated but whose accuracy does not count.
     pub nuisance: Vec<usize>,
     pub measure: Measure,
 }
@@ -51,7 +51,7 @@ pub(super) struct ScaledCriterion {
 pub(super) enum Measure {
     /// Determinant det C_ss = det M_rr / det M, with r the nuisance unknowns.
     Determinant,
-    /// Product Π C_kk over the wanted unknowns.
+    /// Product Π C_kk of the variances of the wanted unknowns, with their covariance C.
     Product,
     /// Weighted sum Σ w_k C_kk over all unknowns; w_k = 0 for nuisance unknowns.
     Trace(DVector<f64>),

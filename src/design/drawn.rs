@@ -24,7 +24,7 @@ pub enum Candidates {
 /// Candidates of a plan as two tables, with the site at which they are measured.
 pub(super) struct Drawn<'a> {
     pub site: Site<'a>,
-    /// Rows given, or poses drawn uniformly.
+    /// Candidates: the rows of a given table, or poses that are uniform within their ranges.
     pub uniform: Measurements,
     /// Poses often at the limits of the ranges; `None` without ranges.
     pub extremes: Option<Measurements>,

@@ -31,7 +31,8 @@ pub struct Exchange {
     candidates: DMatrix<f64>,
     /// Number of measured coordinates of each candidate.
     coordinates: usize,
-    /// Scale by which each unknown is multiplied.
+    /// Factor on each unknown, so that average candidates and priors give each of them unit
+    /// information.
     scale: DVector<f64>,
     /// Information on the scaled unknowns without any candidate: priors, given poses, ridge.
     base_information: DMatrix<f64>,

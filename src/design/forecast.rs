@@ -17,9 +17,9 @@ const MIN_IDENTIFIED: f64 = 1e-6;
 /// Expected result of the identification for one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedParameter {
-    /// Name as in the problem file.
+    /// Name of the parameter, as in the problem file.
     pub name: String,
-    /// Unit of the quantity.
+    /// Unit of the parameter.
     pub unit: Unit,
     /// Nominal value of the parameter, SI.
     pub nominal: f64,
@@ -183,7 +183,8 @@ struct Posterior {
     covariance: DMatrix<f64>,
     /// Diagonal of the covariance: variances of the deviations x.
     variances: Vec<f64>,
-    /// Rows that span the undetermined combinations.
+    /// Rows that span the combinations of parameters that data and priors leave undetermined, shape
+    /// = (combinations, parameters).
     gauge: DMatrix<f64>,
     /// Share of each unknown outside the undetermined combinations.
     visible: Vec<f64>,

@@ -24,7 +24,7 @@ pub struct Growth {
 /// Forecast for n poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GrowthStep {
-    /// Number of poses n.
+    /// Number n of poses for which this forecast holds.
     pub poses: usize,
     /// Number of combinations that the poses determine without priors.
     pub rank: usize,
@@ -32,7 +32,7 @@ pub struct GrowthStep {
     pub undetermined: usize,
     /// Number of parameters of the arm that are identified to 90 % or more.
     pub well_identified: usize,
-    /// Expected error of predicted positions.
+    /// Expected error of predicted positions after n poses.
     pub prediction: Prediction,
 }
 

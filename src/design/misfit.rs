@@ -32,7 +32,7 @@ pub(super) struct Misfit {
     /// Frequency of each feature in each coordinate (cos q, sin q or x, 0), shape = (features, 2
     /// joints).
     frequencies: DMatrix<f64>,
-    /// Phase of each feature \[rad\].
+    /// Phase of each feature, a cosine of the commands \[rad\].
     phases: Vec<f64>,
     /// Standard deviation aⱼ of each joint's smooth error \[rad\] or \[m\]; 0 for a joint that does
     /// not move the target.

@@ -71,7 +71,7 @@ pub struct PlanProgress {
     pub start: Option<usize>,
     /// Number of finished sweeps of the present exchange.
     pub sweep: usize,
-    /// Logarithm of the criterion.
+    /// ln of the value that the design criterion has for these poses; smaller is better.
     pub value: f64,
 }
 
@@ -286,7 +286,8 @@ fn with_known_distances(
 struct WorkspaceGoal {
     /// Assumed misfit, as large as the noise; its real size is not known before the measurement.
     misfit: Misfit,
-    /// Matrix M with tr(C M) = mean variance of predictions.
+    /// Matrix M with which tr(C M) is the mean variance of predictions, for the covariance C of the
+    /// unknowns, shape = (unknowns, unknowns).
     mean_square: DMatrix<f64>,
 }
 

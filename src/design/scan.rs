@@ -20,9 +20,10 @@ const EIGENVALUE_BISECTIONS: usize = 50;
 /// I + J C Jᵀ [Fedorov 1972, ch. 3].
 pub(super) struct CandidateScan<'a> {
     criterion: &'a ScaledCriterion,
-    /// Covariance C of the unknowns without the replaced pose.
+    /// Covariance C of the unknowns if the pose that is to be replaced is left out, shape =
+    /// (unknowns, unknowns).
     covariance: DMatrix<f64>,
-    /// Logarithm of the criterion without the replaced pose.
+    /// ln of the design criterion if the pose that is to be replaced is left out.
     value: f64,
     state: State<'a>,
 }

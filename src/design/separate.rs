@@ -13,7 +13,7 @@ use crate::select::{Separation, separation};
 /// Two effects whose parameters are to be distinguished, with a problem that declares both.
 #[derive(Debug, Clone)]
 pub struct EffectPair {
-    /// Both effects of the pair.
+    /// The two effects that the measurements are to tell apart.
     pub effects: [Effect; 2],
     /// Problem without the two effects.
     pub plain: Problem,
@@ -87,9 +87,9 @@ pub struct PairSeparation {
     pub effects: [Effect; 2],
     /// Criterion that the plan minimises.
     pub criterion: Criterion,
-    /// Separation by the plan.
+    /// Separation of the two effects by the planned poses.
     pub planned: Separation,
-    /// Separation by each random set of poses.
+    /// Separation of the two effects by each random set of as many poses.
     pub random: Vec<Separation>,
 }
 

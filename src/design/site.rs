@@ -49,7 +49,7 @@ pub struct Site<'a> {
     /// Fixture indices of each camera and marker that measure together. They measure the rows that
     /// state no other measured quantity; empty if positions are measured instead.
     pairs: Vec<(usize, usize)>,
-    /// Condition of each pair on the views that are planned.
+    /// Condition of each pair of camera and marker on the views that may be planned.
     rules: Vec<ViewRule>,
 }
 

@@ -12,8 +12,7 @@ use crate::numeric::kernel::{PANEL, dot, dots, norm, subtract, sum_of_squares};
 ///
 /// A wider panel costs more itself and needs fewer passes over the columns behind it.
 const PANEL_WIDTHS: [(usize, usize); 2] = [(WIDE_PANEL, 384), (NARROW_PANEL, MIN_BLOCKED_COLUMNS)];
-/// Number of Householder reflectors that are applied together in the widest panel of the
-/// factorisation.
+/// Number of Householder reflectors in the widest panel, which are applied together.
 const WIDE_PANEL: usize = 96;
 /// Number of reflectors in the narrower panel, and in each part of the widest one.
 const NARROW_PANEL: usize = 32;
@@ -30,8 +29,7 @@ const MIN_BLOCKED_COLUMNS: usize = 128;
 #[derive(Debug, Clone)]
 pub struct Triangle {
     parameters: usize,
-    /// Triangular factor R of all absorbed rows of the Jacobian with the projected residual c = Qᵀr
-    /// beside it: \[R c\], row after row.
+    /// Triangular factor R of all absorbed rows beside the projected residual c, row after row.
     rows: Vec<f64>,
     /// Sum of squares ‖r‖² of all rows absorbed.
     squares: f64,

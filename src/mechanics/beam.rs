@@ -44,9 +44,9 @@ pub struct Wrench<S> {
 /// Displacement \[m\] and small rotation vector \[rad\] of a section, root frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deflection<S> {
-    /// Displacement of the beam's axis \[m\].
+    /// Displacement of the beam's axis at this point, frame of the beam \[m\].
     pub displacement: Vector3<S>,
-    /// Small rotation vector \[rad\].
+    /// Rotation vector of the beam's section at this point, small, frame of the beam \[rad\].
     pub rotation: Vector3<S>,
 }
 
@@ -68,7 +68,7 @@ struct ResponseFactors<S> {
     /// Slope per force and flexibility \[m²\]; for an evenly spread load, per N/m and flexibility
     /// \[m³\].
     slope_of_force: S,
-    /// Deflection per moment and flexibility \[m²\].
+    /// Deflection δ of the tip by a moment M, divided by M and by the flexibility 1/EI \[m²\].
     deflection_of_moment: S,
     /// Slope per moment and flexibility \[m\], which is also stretch per force and twist per
     /// torque.

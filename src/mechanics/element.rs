@@ -12,9 +12,9 @@ use crate::spatial::{Frame, rotate};
 pub(super) struct LinkLoad<S> {
     /// Index of the element that carries the load.
     pub element: usize,
-    /// Position in the beam's frame \[m\].
+    /// Position of the load in the frame of its beam \[m\].
     pub at: Vector3<S>,
-    /// Force, arm base frame \[N\].
+    /// Force of the load, arm base frame \[N\].
     pub force: Vector3<S>,
     /// True for the force of a hoist's rope, which may depend on the position.
     pub rope: bool,
@@ -32,7 +32,7 @@ pub(super) struct Element<'a, S> {
     pub flexibility: Flexibility<S>,
     /// Strain of the beam without load.
     pub strain: Option<Strain<S>>,
-    /// Weight of the element \[N\].
+    /// Weight of the element, arm base frame \[N\].
     pub weight: Vector3<S>,
     /// Loads of the whole beam.
     pub loads: &'a [LinkLoad<S>],
@@ -51,7 +51,7 @@ pub(super) struct Element<'a, S> {
 pub(super) struct BentElement<'a, S> {
     element: &'a Element<'a, S>,
     cantilever: Cantilever<'a, S>,
-    /// Deflection at the tip.
+    /// Deflection of the element at its tip relative to its root.
     tip: Deflection<S>,
     /// Frame at the root, x along the chord, rotated about it by half the twist.
     chord: Frame<S>,

@@ -24,7 +24,7 @@ pub struct Nonlinear<S> {
 pub struct AddedMass<S> {
     /// Size of the mass \[kg\].
     pub mass: S,
-    /// Distance from the link's root \[m\].
+    /// Distance of the added mass from the root of the link \[m\].
     pub at: S,
 }
 

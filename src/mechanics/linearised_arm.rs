@@ -59,9 +59,9 @@ pub(super) struct LinearisedSegment {
     /// Indices of the unknown moments that deflect the segment.
     pub unknowns: Range<usize>,
     pub moment_direction: usize,
-    /// First direction that belongs to a parameter.
+    /// Index of the first direction of the segment that belongs to a parameter.
     pub parameter_direction: usize,
-    /// Number of all directions.
+    /// Number of directions in which the segment is linearised: moments and parameters.
     pub directions: usize,
     /// Events of the forward pass that are the segment's loads.
     pub events: Range<usize>,
@@ -134,7 +134,7 @@ pub(super) struct LinearisedArm {
     pub moves: Vec<Vector3<f64>>,
     /// Influence Λ: for each moment the three coordinates of the target [m/(N·m)].
     pub influence: Vec<f64>,
-    /// Image of Λ in the last sweep.
+    /// Image of the influence Λ under the last sweep of the fixed-point iteration [m/(N·m)].
     pub image: Vec<f64>,
     pub anderson: Anderson,
     /// Derivatives of the position with respect to the parameters, by segment and direction.

@@ -21,9 +21,9 @@ pub struct PointMass {
 pub struct Hoist {
     /// Position of the hook in the beam's frame \[m\].
     pub at: Vector3<f64>,
-    /// Force in poses that give none \[N\].
+    /// Suspension force in poses that give none \[N\].
     pub force: f64,
-    /// Unit direction, arm base frame.
+    /// Unit vector of the suspension force, arm base frame.
     pub direction: Vector3<f64>,
 }
 

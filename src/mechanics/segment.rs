@@ -60,7 +60,7 @@ impl Segment {
 /// End of a segment in a forward pass made segment by segment.
 #[derive(Debug, Clone)]
 pub(super) struct Cut<S> {
-    /// Frame at the end.
+    /// Frame at the end of the segment, arm base frame.
     pub frame: Frame<S>,
     pub segment: Segment,
     /// Index of the first moment that deflects the segment, and number of these moments.

@@ -50,7 +50,7 @@ pub struct StaticState {
     /// Frame of the joint `tip`, arm base frame.
     pub frame: Frame<f64>,
     pub(super) tip: usize,
-    /// Moments x* at equilibrium [N·m].
+    /// Moments x* of the loads at equilibrium, one for each unknown moment [N·m].
     pub(super) moments: Vec<f64>,
     /// Influence Λ, shape = (3, moments), row-major [m/(N·m)]; empty until it is computed.
     pub(super) adjoint: Vec<f64>,

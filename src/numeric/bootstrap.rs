@@ -7,7 +7,7 @@ use statrs::function::erf::{erfc, erfc_inv};
 /// Estimate with its confidence interval, at the level that the function returning it states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
-    /// Estimate of the quantity, in its unit.
+    /// Estimate of the quantity to which the interval belongs, in the unit of the quantity.
     pub value: f64,
     /// Lower end of the interval, in the unit of the quantity.
     pub low: f64,

@@ -27,7 +27,7 @@ pub struct Bounds {
 /// Error bounds with the errors of measured positions that they are compared with.
 #[derive(Debug, Clone, Copy)]
 pub struct Compared<'a> {
-    /// Error bounds of the rows of a table.
+    /// Error bounds with which the errors of a table's rows are compared.
     pub bounds: &'a Bounds,
     /// Row and error length \[m\] of each row that measures a position.
     pub errors: &'a [(usize, f64)],

@@ -51,9 +51,9 @@ pub struct Fitted {
 pub(super) struct LeftOutRow {
     /// Index of the row in its table.
     row: usize,
-    /// Index of the configuration of the row.
+    /// Index of the configuration of the row among those that were left out.
     configuration: usize,
-    /// Error length \[m\].
+    /// Length of the error of the row, predicted without its configuration \[m\].
     length: f64,
 }
 

@@ -61,7 +61,7 @@ pub struct Gain {
     /// Increase of the logarithm of the marginal likelihood over that of noise alone, including the
     /// priors of the hyperparameters.
     pub ln_evidence: f64,
-    /// Number of configurations averaged over.
+    /// Number of left-out configurations over which the gain is averaged.
     pub configurations: usize,
 }
 

@@ -18,7 +18,7 @@ pub(super) struct Inducing {
     /// Rows at which the shift of the position (three coordinates) is an inducing variable. Their
     /// residuals and Jacobians are not used.
     pub centres: Rows,
-    /// Knots of the functions uⱼ of single joints.
+    /// Inducing variables of the error functions uⱼ, each of one joint's command.
     pub knots: Vec<Knot>,
 }
 

@@ -51,7 +51,6 @@ pub fn loop_brief(
 ) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result, accuracy.as_ref());
-    // The summary shows only the errors of held-out rows, whose column of χ² is empty.
     let corrected = accuracy.as_ref().and_then(|accuracy| accuracy.corrected);
     let mut table = errors(closure, result, corrected.as_ref());
     let held_out = table.rows.iter().take_while(|row| row[0] != IDENTIFICATION).count();
@@ -99,10 +98,9 @@ fn cause(found: &FoundEffect, max_values: usize) -> Point {
     let values = values.map(|value| effect::without_effect(value, &found.effect.effect));
     let (mut facts, more) = split_at_most(values, max_values);
     facts.extend((more > 0).then(|| "others in loop.json".to_owned()));
-    // The title of a cause that is not sure states the probability.
     let law = match &found.claims {
         Some(claims) => {
-            format!("probability among the laws tried {}", percent(claims.law.probability))
+            format!("law: {} among those tried", percent(claims.law.probability))
         }
         None => "probability of the law not determined".to_owned(),
     };
@@ -435,7 +433,9 @@ fn gain_sentences(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool)
     let gain = known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
         let (_, unit) = result.after.errors.judged().norms();
         let includes_zero = low <= 0.0 && high >= 0.0;
-        let falls = if mean < 0.0 { "rises" } else { "falls" };
+        let is_worse = mean < 0.0 && !includes_zero;
+        let (low, high) = if is_worse { (-high, -low) } else { (low, high) };
+        let falls = if is_worse { "rises" } else { "falls" };
         let [gain, size, low, high] = [mean, mean.abs(), low, high].map(|value| number(value, 4));
         if includes_zero {
             return format!(
@@ -445,8 +445,8 @@ fn gain_sentences(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool)
             );
         }
         format!(
-            "With what was found the mean error of the {} {falls} by {size} {unit} (gain {low} to \
-             {high} {unit}, 95 %).",
+            "With what was found the mean error of the {} {falls} by {size} {unit} ({low} to {high} \
+             {unit}, 95 %).",
             held_out_rows(after)
         )
     });

@@ -15,6 +15,10 @@ use crate::results::{CommandedJoint, commanded_joints, pose_columns};
 /// doubted.
 const MAX_USUAL_TOLERANCE_RATIO: f64 = 50.0;
 
+/// Number of standard errors by which the attainable bound must exceed the tolerance to be called
+/// out of reach.
+const REACH_SIGMAS: f64 = 2.0;
+
 /// Returns a choice of poses, with a figure of the error expected after each of them.
 pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story {
     let percent = number(options.level * 100.0, 1);
@@ -68,7 +72,7 @@ fn error_paragraph(next: &NextPoses, percent: &str) -> String {
             mm(error.bound, 3),
             next.attainable
                 .map(|least| format!(
-                    " As far as these rows tell, no number of further poses brings the rms below {} mm or the bound below {} mm.",
+                    " As far as these rows tell, further poses alone bring the rms to about {} mm at best, and the bound to about {} mm.",
                     mm(least, 3),
                     mm(attainable_bound(&error), 3)
                 ))
@@ -213,10 +217,9 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
              the tolerance of {tolerance} mm. A better {} is needed.",
             lacking(next, options)
         ),
-        (_, Some(tolerance), None)
-            if next.error.zip(options.tolerance).is_some_and(|(error, most)| attainable_bound(&error) > most) => format!(
-            "Probably out of reach with more poses alone: they are expected to bring the bound no \
-             further than {} mm, and the tolerance is {tolerance} mm. A better {} is needed.",
+        (_, Some(tolerance), None) if next.error.is_some_and(|error| is_beyond_poses(&error, options)) => format!(
+            "Out of reach with more poses alone: they are expected to bring the bound no further than about {} mm, and the tolerance is \
+             {tolerance} mm. A better {} is needed.",
             next.error.map_or_else(String::new, |error| mm(attainable_bound(&error), 3)),
             lacking(next, options)
         ),
@@ -243,6 +246,13 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
 /// Returns the bound that arbitrarily many further poses are expected to reach \[m\].
 fn attainable_bound(error: &WorkspaceError) -> f64 {
     error.bound * error.least / error.expected
+}
+
+/// Returns true if the bound that further poses are expected to reach is above the tolerance by more
+/// than [`REACH_SIGMAS`] standard errors.
+fn is_beyond_poses(error: &WorkspaceError, options: &NextOptions) -> bool {
+    let least = 1.0 - REACH_SIGMAS * error.expected_sigma / error.expected;
+    options.tolerance.is_some_and(|most| attainable_bound(error) * least > most)
 }
 
 /// Names what must be better for the error bound to fall below the tolerance.

@@ -231,6 +231,7 @@ fn state_explanations(findings: &mut [Finding]) {
 fn state_held_out_remedies(findings: &mut [Finding]) {
     let has = |codes: &[FindingCode]| findings.iter().any(|found| codes.contains(&found.code));
     let (is_far_off, is_beyond_noise) = (has(&FAR_OFF), has(&BEYOND_NOISE));
+    let has_cause = has(&[FindingCode::RowsSetAside]);
     for finding in findings {
         // Remedies that name a cause stay.
         if finding.remedy != finding.code.entry().remedy {
@@ -244,6 +245,9 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             {
                 "find first why the fitted rows are missed; more poses or other priors do not \
                  mend that"
+            }
+            FindingCode::HeldOutOutliers if has_cause => {
+                "the cause that sets fitted rows aside may act there too: look for it first"
             }
             FindingCode::HeldOutOutliers if is_beyond_noise => {
                 "the fitted rows are off too: look first for what the model lacks with flexcal \

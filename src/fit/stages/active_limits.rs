@@ -9,7 +9,7 @@ use crate::least_squares::solver::AtBound;
 pub(in crate::fit) struct ActiveLimit {
     /// Index of the constraint among those of the model.
     pub constraint: usize,
-    /// Limit (lower or upper) that is active.
+    /// Limit (lower or upper) of the constraint on which the fit rests.
     pub side: AtBound,
     /// Coefficients of the constraint, one per unknown.
     pub row: Vec<f64>,

@@ -20,9 +20,9 @@ const MIN_INFORMATIVE_EIGENVALUE: f64 = 1e-10;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct EarlierData {
     names: Vec<String>,
-    /// Matrix A, shape = (rows, names).
+    /// Matrix A of the rows A x + b that stand for the earlier data, shape = (rows, names).
     matrix: DMatrix<f64>,
-    /// Constant b, length = rows.
+    /// Constant b of the rows A x + b that stand for the earlier data, length = rows.
     constant: DVector<f64>,
 }
 

@@ -29,7 +29,7 @@ const MAX_OTHER_RATIO: f64 = 0.2;
 /// Median rms errors of views by themselves \[px\].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SingleViews {
-    /// Error with the points as the table numbers them.
+    /// Median rms reprojection error of the views with the points as the table numbers them \[px\].
     pub declared: f64,
     /// Error with the points of a grid counted along its other side.
     pub transposed: f64,

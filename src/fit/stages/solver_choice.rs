@@ -12,7 +12,7 @@ worded! {
         /// `docs/solvers.md` explains why.
         #[default]
         Auto = "auto", "Bounded where there are bounds or constraints, else levenberg-marquardt";
-        /// Levenberg–Marquardt without bounds.
+        /// Levenberg–Marquardt solver, for problems without bounds and constraints.
         LevenbergMarquardt = "levenberg-marquardt", "Levenberg-Marquardt without bounds";
         /// Gauss–Newton method of the crate argmin, with undamped steps.
         GaussNewton = "gauss-newton", "Gauss-Newton: undamped steps";

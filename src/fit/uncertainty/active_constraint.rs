@@ -15,7 +15,7 @@ pub struct ActiveConstraint {
     pub constraint: usize,
     /// Text of the constraint with its active limit, such as `ln A.EI − ln B.EI ≥ 0`.
     pub words: String,
-    /// Limit (lower or upper) that is active.
+    /// Limit (lower or upper) of the constraint on which the fit rests.
     pub side: AtBound,
     /// Shadow price of moving the limit outwards, per unit of the limit.
     pub shadow_price: ShadowPrice,

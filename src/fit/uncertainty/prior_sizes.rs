@@ -33,13 +33,13 @@ const CONVERGENCE_TOLERANCE: f64 = 1e-4;
 pub struct PriorSize {
     /// Pattern of the parameters as in `[parameters]`, such as `joint*.alpha`.
     pub pattern: String,
-    /// Kind of quantity: angle or length.
+    /// Kind of quantity of the parameters that share the prior: angle or length.
     pub unit: Unit,
-    /// Number of parameters of the kind.
+    /// Number of parameters that share the prior.
     pub count: usize,
-    /// Declared 1 σ \[SI\].
+    /// Declared standard deviation (1 σ) of the prior \[SI\].
     pub declared: f64,
-    /// Estimated 1 σ, which maximises the evidence \[SI\].
+    /// Standard deviation (1 σ) of the prior that maximises the evidence of the data \[SI\].
     pub found: f64,
 }
 

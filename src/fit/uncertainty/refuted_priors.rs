@@ -166,9 +166,10 @@ struct Best {
 
 /// Linearised data from which the evidence of priors and noise variances is computed.
 struct Evidence {
-    /// Information RᵀR of the free unknowns.
+    /// Information RᵀR of the data on the free unknowns, shape = (free, free).
     information: DMatrix<f64>,
-    /// Vector Rᵀc of the free unknowns.
+    /// Vector Rᵀc of the data for the free unknowns: triangular factor R times the projected
+    /// residual c.
     vector: DVector<f64>,
     /// Sum ‖r₀‖² of the squared whitened residuals of the nominal arm.
     squares: f64,

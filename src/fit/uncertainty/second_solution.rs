@@ -61,7 +61,7 @@ const MIN_PROBABILITY: f64 = 1e-3;
 /// Second optimum of a fit, which the measurements do not exclude.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct SecondSolution {
-    /// Full parameter vector.
+    /// Full parameter vector of the second solution: the deviation of each parameter from nominal.
     pub x: DVector<f64>,
     /// Excess of χ², with priors, over that of the fit; for an estimated σ that of −2 ln of the
     /// likelihood.
@@ -230,13 +230,13 @@ struct Surroundings<'a> {
 
 /// Place beyond a fold, along one direction from an optimum.
 struct Mirror {
-    /// Unknowns there, as far as second derivatives tell.
+    /// Unknowns at the mirrored solution, as far as second derivatives tell.
     start: DVector<f64>,
-    /// True if a built arm may have these unknowns.
+    /// True if a built arm may have the unknowns of the mirrored solution.
     is_plausible: bool,
     /// Increase of χ² there, as far as second derivatives tell.
     foretold: f64,
-    /// Change of all rows along the direction, of unit length.
+    /// Change of all whitened residuals along the mirrored direction, a vector of unit length.
     slope: DVector<f64>,
     /// Least-squares adjustment of the unknowns to b, scaled to a change of all rows by 1.
     adjusted: DVector<f64>,

@@ -88,8 +88,7 @@ pub struct Terms {
     pub factors: Vec<Factor>,
     /// Values of each factor in all poses: one column, or two for a sine with its cosine.
     values: Vec<Vec<DVector<f64>>>,
-    /// Number of leading `factors` that are from the dictionary; the later ones have refined inner
-    /// parameters.
+    /// Number of leading `factors` from the dictionary; later ones have refined inner parameters.
     listed: usize,
     /// Terms in groups of equal width.
     pub chunks: Vec<Chunk>,
