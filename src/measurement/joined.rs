@@ -300,7 +300,7 @@ impl JoinedLog {
     /// each other, which other clocks would hardly give.
     fn small_tolerance(&self) -> Option<TableErrorKind> {
         let gaps = self.gaps(true);
-        let most = *gaps.get(gaps.len() * 9 / 10)?;
+        let (usual, most) = (*gaps.get(gaps.len() / 2)?, *gaps.get(gaps.len() * 9 / 10)?);
         let mut steps: Vec<f64> =
             self.log_times.iter().zip(self.log_times.iter().skip(1)).map(|(a, b)| b - a).collect();
         steps.sort_by(f64::total_cmp);
@@ -311,7 +311,7 @@ impl JoinedLog {
             TableErrorKind::ToleranceTooSmall {
                 left: self.unpaired.len(),
                 rows: self.requested,
-                gap: format!("{} s", two_digits(gaps[gaps.len() / 2], 3)),
+                gap: format!("{} s", two_digits(usual, 3)),
                 step: format!("{} s", two_digits(step, 3)),
                 tolerance: two_digits(tolerance, 6),
             }
