@@ -306,7 +306,7 @@ impl JoinedLog {
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2)?;
         let digit = 10_f64.powf((2.0 * most).log10().floor());
-        let tolerance = (2.0 * most / digit).ceil() * digit;
+        let tolerance = (2.0 * most / digit - 1e-6).ceil() * digit;
         (gaps.len() >= MIN_CHECKED_ROWS && 10.0 * most < step).then(|| {
             TableErrorKind::ToleranceTooSmall {
                 left: self.unpaired.len(),
