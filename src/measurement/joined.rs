@@ -298,19 +298,18 @@ impl JoinedLog {
     /// each other, which other clocks would hardly give.
     fn small_tolerance(&self) -> Option<TableErrorKind> {
         let gaps = self.gaps(true);
-        let most = *gaps.get(gaps.len() * 9 / 10)?;
+        let (usual, most) = (*gaps.get(gaps.len() / 2)?, *gaps.get(gaps.len() * 9 / 10)?);
         let mut steps: Vec<f64> =
             self.log_times.iter().zip(self.log_times.iter().skip(1)).map(|(a, b)| b - a).collect();
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2)?;
-        let gap = *gaps.get(gaps.len() / 2)?;
         let digit = 10_f64.powf((2.0 * most).log10().floor());
-        let tolerance = (2.0 * most / digit).ceil() * digit;
+        let tolerance = (2.0 * most / digit - 1e-6).ceil() * digit;
         (gaps.len() >= MIN_CHECKED_ROWS && 10.0 * most < step).then(|| {
             TableErrorKind::ToleranceTooSmall {
                 left: self.unpaired.len(),
                 rows: self.requested,
-                gap: format!("{} s", two_digits(gap, 3)),
+                gap: format!("{} s", two_digits(usual, 3)),
                 step: format!("{} s", two_digits(step, 3)),
                 tolerance: two_digits(tolerance, 6),
             }

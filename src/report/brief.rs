@@ -91,7 +91,8 @@ fn farthest_for_its_prior(found: &Identification) -> Option<String> {
     });
     let farthest = farthest.max_by(|a, b| a.2.total_cmp(&b.2))?;
     let (estimate, whole, sigmas) = farthest;
-    let alike: Vec<String> = correlated(found)
+    let alike: Vec<String> = found
+        .strong_correlations()
         .into_iter()
         .filter_map(|(a, b, _)| match &estimate.name {
             name if *name == a => Some(b),
@@ -103,7 +104,7 @@ fn farthest_for_its_prior(found: &Identification) -> Option<String> {
     let alike = if alike.is_empty() {
         String::new()
     } else {
-        format!(", or {}, which acts alike,", alike.join(" and "))
+        format!(", or {} that acts alike,", alike.join(" or "))
     };
     (sigmas > MIN_REMARKED_SIGMAS).then(|| {
         format!(

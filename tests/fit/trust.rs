@@ -91,6 +91,8 @@ fn poses_measured_again_decide_nothing() {
             &["warning: 2 different poses measure 6 coordinates, fewer than the"],
         );
         assert!(!run.stdout.contains("explains the data"), "{command}: {run:?}");
+        let is_unjudged = run.stdout.contains("Not judged, because priors decide most of it");
+        assert_eq!(is_unjudged, command == "identify", "{command}: {run:?}");
     }
     let three = bench(PRIORS, |lines| repeated(&lines, 3, 3));
     identify_arm(&three);

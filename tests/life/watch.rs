@@ -62,6 +62,30 @@ fn misfit_that_repeats_with_the_pose_is_no_change() {
 }
 
 #[test]
+fn a_misread_table_is_named_before_a_change() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 2);
+    let mistakes: [(fn(&mut Measurements), &str); 2] = [
+        (|rows| rows.positions.iter_mut().for_each(|at| *at *= 1e-3), "positions that are metres"),
+        (
+            |rows| {
+                let joints = rows.joints;
+                rows.configurations.chunks_exact_mut(joints).for_each(|q| q[1] = -q[1]);
+            },
+            "joint 2 that counts the other way",
+        ),
+    ];
+    for (mistake, expected) in mistakes {
+        let mut rows = bench.measure(&arm, 6, 4002, 1.0);
+        mistake(&mut rows);
+        let verdict = judged(&bench, &estimate, &rows);
+        let cause = &verdict.causes[0];
+        assert!(verdict.is_changed() && cause.kind == CauseKind::Misread, "{verdict:?}");
+        assert!(cause.label.contains(expected), "{verdict:?}");
+    }
+}
+
+#[test]
 fn a_moved_zero_and_a_moved_tool_are_named_with_their_size() {
     let bench = Bench::new();
     let (arm, estimate) = calibrated(&bench, 2);

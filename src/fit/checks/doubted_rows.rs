@@ -127,11 +127,14 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         let mut factors = LENGTH_FACTORS.into_iter().filter(|_| chosen.len() >= WINDOW);
         factors.find(fits).map(|(_, words)| format!("their positions are in another unit: {words}"))
     };
+    let kept: Vec<usize> = trial.near.iter().map(|&place| rows[place]).collect();
     let cause = other_session(fit, &trial.x, &chosen, limit)
         .or_else(|| mistake(&pairs, limit))
+        .or_else(|| other_joint_angles(fit, &trial.x, &chosen, limit))
         .or_else(|| mistaken_joints(fit, &trial.x, &chosen, limit))
         .or_else(stands_elsewhere)
-        .or_else(in_other_unit);
+        .or_else(in_other_unit)
+        .or_else(|| of_other_target(fit, &chosen, &kept));
     if cause.is_none() && are_few {
         return None;
     }
@@ -193,14 +196,74 @@ fn registered<R>(
     evaluate(&fitting)
 }
 
-/// Returns sets of places in `rows`: in each set, successive rows of every base.
+/// Returns the words for positions of the `chosen` rows that belong to the joint angles of other
+/// rows of the table, to `limit` \[m\] with the registered arm `x`. A shift leaves a row without a
+/// position.
+fn other_joint_angles(
+    fit: &CheckedFit,
+    x: &DVector<f64>,
+    chosen: &[usize],
+    limit: f64,
+) -> Option<String> {
+    let table = fit.fitting.measurements;
+    let is_position = |row: &usize| table.observation(*row).is_position();
+    let every_row: Vec<usize> = (0..table.len()).filter(is_position).collect();
+    let errors = fit.fitting.position_errors(&every_row, x);
+    let predicted: Vec<(usize, Vector3<f64>)> = every_row
+        .iter()
+        .zip(errors)
+        .map(|(&row, error)| (row, table.positions[row] - error))
+        .collect();
+    let source = |row: &usize| {
+        let distance = |of: &&(usize, Vector3<f64>)| (of.1 - table.positions[*row]).norm();
+        let nearest = predicted.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        (nearest.0 != *row && distance(&nearest) < limit)
+            .then(|| nearest.0.cast_signed() - row.cast_signed())
+    };
+    let mut shifts: Vec<isize> = chosen.iter().filter_map(source).collect();
+    if shifts.len() < chosen.len().saturating_sub(1).max(2) {
+        return None;
+    }
+    shifts.sort_unstable();
+    Some(match (shifts[0], shifts[shifts.len() - 1]) {
+        (-1, -1) => "their positions belong to the joint angles of the row before".to_owned(),
+        (1, 1) => "their positions belong to the joint angles of the row after".to_owned(),
+        _ => "their positions belong to each other's joint angles".to_owned(),
+    })
+}
+
+/// Returns the words for `chosen` rows that are those of other targets than all rows that are
+/// `kept`; `None` if they have a target in common.
+fn of_other_target(fit: &CheckedFit, chosen: &[usize], kept: &[usize]) -> Option<String> {
+    let placement = fit.fitting.placement;
+    let of =
+        |rows: &[usize]| rows.iter().map(|&row| placement.target_of(row)).collect::<BTreeSet<_>>();
+    let (apart, others) = (of(chosen), of(kept));
+    let names: Vec<&str> = apart.iter().map(|&target| placement.targets[target].as_str()).collect();
+    apart.is_disjoint(&others).then(|| {
+        format!(
+            "they are those of target {}: check its place, its unit, and where its branch of the \
+             arm begins",
+            names.join(" and ")
+        )
+    })
+}
+
+/// Returns sets of places in `rows`: in each set, successive rows of every base, of all targets or of
+/// one target alone.
 fn windows(fit: &CheckedFit, rows: &[usize]) -> Vec<Vec<usize>> {
     let placement = fit.fitting.placement;
     let of_base = |base: usize| -> Vec<usize> {
         (0..rows.len()).filter(|&place| placement.base_of(rows[place]) == base).collect()
     };
     let groups: Vec<Vec<usize>> = (0..placement.bases.len()).map(of_base).collect();
-    let trials = MAX_TRIALS.min(rows.len() / WINDOW.max(1));
+    let of_target = |target: usize| -> Vec<usize> {
+        let is_of_target = |place: &usize| placement.target_of(rows[*place]) == target;
+        groups.iter().flatten().copied().filter(is_of_target).take(2 * WINDOW).collect()
+    };
+    let several = placement.targets.len() > 1 && placement.targets != placement.bases;
+    let targets = if several { placement.targets.len() } else { 0 };
+    let trials = MAX_TRIALS.min((rows.len() + 1).saturating_sub(WINDOW));
     let window = |trial: usize| {
         let part = |group: &Vec<usize>| {
             let last = group.len().saturating_sub(WINDOW);
@@ -209,7 +272,8 @@ fn windows(fit: &CheckedFit, rows: &[usize]) -> Vec<Vec<usize>> {
         };
         groups.iter().flat_map(part).collect()
     };
-    (0..trials).map(window).collect()
+    let by_target = (0..targets).map(of_target).filter(|places| places.len() >= WINDOW);
+    (0..trials).map(window).chain(by_target).collect()
 }
 
 /// Returns the words for `chosen` rows that fit the bases of other sessions to `limit` \[m\], with
@@ -317,13 +381,6 @@ fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String>
     let mut factors = LENGTH_FACTORS.into_iter();
     if let Some((_, words)) = factors.find(|(factor, _)| fits(&|measured, _| measured * *factor)) {
         return Some(format!("their positions are in another unit: {words}"));
-    }
-    let is_of_another = pairs.iter().enumerate().all(|(row, (measured, _))| {
-        let mut others = pairs.iter().enumerate().filter(|(other, _)| *other != row);
-        others.any(|(_, (_, predicted))| (measured - predicted).norm() < limit)
-    });
-    if is_of_another {
-        return Some("their positions belong to each other's joint angles".to_owned());
     }
     let axis = (0..3).find(|&axis| {
         fits(&|measured, predicted| {

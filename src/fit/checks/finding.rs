@@ -123,7 +123,7 @@ finding_codes! {
         "A second arm, more than 3 standard errors from the fitted one, explains the measurements too: its probability is above 0.1 %.",
         "measure poses in which the two differ, or give priors that decide between them";
     BeyondPrior: Error "beyond-prior" ["parameter", "sigmas"]
-        "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior, or of the part of it that the data determine beside others that act alike.",
+        "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",
         "check axes of the measuring frame, signs of joints, units, and the prior";
     ScaleContradicted: Error "scale-contradicted" ["error", "sigmas", "lengths"]
         "All fitted lengths of the arm together deviate from nominal by one factor, more than \

@@ -148,6 +148,18 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     if findings.iter().any(is_of_table) {
         findings.retain(|found| found.code != FindingCode::RowsChanged);
     }
+    // Rows that explain the misfit are shown by a fit, columns without one are only suspected.
+    if findings.iter().any(|found| found.code == FindingCode::RowsDoubted) {
+        let is_shown = |found: &Finding| !found.value("after").is_some_and(Value::is_null);
+        findings.retain(|found| found.code != FindingCode::ColumnDoubted || is_shown(found));
+    }
+    // A unit that the size of the arm shows is the reason for distrust, unless a reading fits.
+    let shows_unit = |found: &Finding| {
+        found.code == FindingCode::OtherSize && found.remedy != found.code.entry().remedy
+    };
+    if !findings.iter().any(|found| found.code == FindingCode::Misread) {
+        findings.sort_by_key(|found| !shows_unit(found));
+    }
     // Where a check names the cause of a misfit, the findings on the misfit state this cause.
     let cause = CAUSES.iter().find_map(|code| findings.iter().find(|found| found.code == *code));
     // The finding on the limits states the errors after its cause.

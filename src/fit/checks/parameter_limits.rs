@@ -46,24 +46,7 @@ pub(super) fn prior_sigmas(parameter: &Parameter, x: f64) -> Option<f64> {
     Some(x.abs() / parameter.sigma.filter(|_| is_of_arm(parameter))?)
 }
 
-/// Smallest identified share of a parameter for which [`expected_sigmas`] corrects the prior σ.
-/// Parameters that act alike share a deviation: four of them have a quarter each.
-const MIN_SHARE: f64 = 0.25;
-
-/// Returns the absolute deviation `x` of a parameter in standard deviations of its estimate under
-/// the prior: |x| / (σ √s), with the prior σ and the identified share s = 1 − (standard error / σ)².
-/// It is that of the deviation which parameters that act alike share. `None` as for
-/// [`prior_sigmas`].
-fn expected_sigmas(fit: &CheckedFit, parameter: &Parameter, x: f64) -> Option<f64> {
-    let is_of = |k: &usize| std::ptr::eq(&raw const fit.fitting.model.parameters[*k], parameter);
-    let place = fit.whole.unknowns.iter().position(is_of);
-    let share = place.and_then(|place| fit.statistics.identified.get(place)).copied();
-    let share = share.filter(|share| *share >= MIN_SHARE).unwrap_or(1.0);
-    Some(prior_sigmas(parameter, x)? / share.sqrt())
-}
-
-/// Checks that no parameter of the arm deviates by more than [`MAX_PRIOR_SIGMAS`] σ of its prior, or
-/// of the part of it that the data determine.
+/// Checks that no parameter of the arm deviates by more than [`MAX_PRIOR_SIGMAS`] σ of its prior.
 pub(super) struct WithinPriors;
 
 impl Check for WithinPriors {
@@ -98,8 +81,8 @@ impl Check for WithinPriors {
                 None => finding,
             }
         };
-        let sigmas = |parameter: &Parameter, x: f64| expected_sigmas(fit, parameter, x);
-        let largest = largest_ratio(fit, sigmas).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
+        let largest =
+            largest_ratio(fit, prior_sigmas).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
         largest.map(finding).into_iter().collect()
     }
 }

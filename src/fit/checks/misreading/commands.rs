@@ -1,5 +1,6 @@
 //! Misreadings of the columns of joints: their candidates and corrections.
 
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 use super::{Misreading, numbers_of, power_of_ten};
@@ -46,17 +47,13 @@ pub(super) fn of_mixed_units(problem: &Problem, table: &Measurements) -> Vec<Mis
         };
         let set: Vec<u64> =
             turning.iter().filter(|&j| is_of_set(j)).map(|joint| 1 << joint).collect();
-        let all = (1_u64 << set.len().min(MAX_SUBSETS)) - 1;
-        let chosen = |bits: u64| -> u64 {
-            if set.len() > MAX_SUBSETS {
-                return set.iter().sum();
-            }
+        let part = |bits: u64| -> u64 {
             set.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1).map(|(_, bit)| bit).sum()
         };
-        let first = if set.len() > MAX_SUBSETS { all } else { 1 };
-        let is_mixed = set.len() < turning.len();
-        let sets = (first..=all).map(chosen).filter(|bits| is_mixed && bits.count_ones() > 1);
-        let sets: Vec<u64> = sets.collect();
+        let parts = if set.len() > MAX_SUBSETS { 1 } else { 1_u64 << set.len() };
+        let is_mixed = |joints: &u64| joints.count_ones() > 1 && set.len() < turning.len();
+        let whole = set.iter().sum::<u64>();
+        let sets: BTreeSet<u64> = (1..parts).map(part).chain([whole]).filter(is_mixed).collect();
         sets.into_iter().map(move |joints| Misreading::MixedUnits { joints, is_radians })
     });
     sets.collect()

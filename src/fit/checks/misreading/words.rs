@@ -202,17 +202,6 @@ impl fmt::Display for Misreading {
                 }?;
                 f.write_str(", declared as degrees")
             }
-            Self::MixedUnits { joints, is_radians } => {
-                let [found, declared] =
-                    if is_radians { ["radians", "degrees"] } else { ["degrees", "radians"] };
-                let numbers = listed_joints(joints);
-                write!(f, "joints {numbers} alone that are in {found}, declared as {declared}")
-            }
-            Self::Cycled { joints: [first, second, third] } => write!(
-                f,
-                "columns of joints {first}, {second} and {third} that hold the angles of joints \
-                 {second}, {third} and {first}"
-            ),
             Self::Scale { .. } => f.write_str(
                 "positions on another scale than the joint table (scale factor of the instrument, \
                  or a joint table of another size of this arm)",
@@ -230,7 +219,6 @@ impl fmt::Display for Misreading {
                      join the tables by name or number, not by order)"
                 )
             }
-            Self::ReversedRows => f.write_str("positions in the opposite order of the rows"),
             Self::InversePose => f.write_str(
                 "poses that are inverse (of the measuring frame in the frame of the target; invert \
                  each 4 × 4 matrix)",
@@ -260,10 +248,6 @@ impl fmt::Display for Misreading {
                     write!(f, "joint {numbers} that counts the other way")
                 }
             }
-            Self::Rotated { by } => {
-                let places = if by == 1 { "place" } else { "places" };
-                write!(f, "columns of the joints that are moved on by {by} {places}")
-            }
             Self::AxisUnit { axis, power } => {
                 let (found, declared) = match power {
                     3 => ("metres", "millimetres"),
@@ -278,38 +262,12 @@ impl fmt::Display for Misreading {
                 let name = ['x', 'y', 'z'][axis];
                 write!(f, "{name} alone that is in inches, declared in millimetres")
             }
-            Self::Exchanged { joint, with } => {
-                write!(f, "columns of joints {joint} and {with} that are exchanged")
-            }
-            Self::Coupled { joint, from, is_opposite } => {
-                let sign = if is_opposite { "minus " } else { "" };
-                write!(f, "joint {joint} that also turns by {sign}the command of joint {from}")
-            }
-            Self::Screw { joint, from, lead } => {
-                write!(f, "joint {joint} that also turns once per {lead} mm of joint {from}")
-            }
             Self::Shifted { by, from } => {
                 let rows = if by.abs() == 1 { "row" } else { "rows" };
                 let side = if by > 0 { "before" } else { "after" };
                 write!(f, "positions that belong to the configuration {} {rows} {side}", by.abs())?;
                 if from > 0 { write!(f, ", from row {} of the table on", from + 1) } else { Ok(()) }
             }
-            Self::Zero { joint, degrees } => {
-                write!(f, "joint {joint} whose zero position is {degrees}° off")
-            }
-            Self::Ratio { joint, percent } => {
-                let ratio = f64::from(percent) / 100.0;
-                write!(f, "joint {joint} that turns by {ratio} times its command")
-            }
-            _ => self.fmt_of_loads(f),
-        }
-    }
-}
-
-impl Misreading {
-    /// Writes the description of a misreading of images, loads, targets or the joint table.
-    fn fmt_of_loads(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
             Self::ExchangedAxes => f.write_str("columns u and v that are exchanged"),
             Self::FromBottom => {
                 f.write_str("a column v that counts from the bottom of the image (write height − v)")
@@ -325,6 +283,55 @@ impl Misreading {
                 let plural = if views == 1 { "" } else { "s" };
                 write!(f, "images that belong to the configuration {views} view{plural} {side}")
             }
+            Self::Zero { joint, degrees } => {
+                write!(f, "joint {joint} whose zero position is {degrees}° off")
+            }
+            Self::Ratio { joint, percent } => {
+                let ratio = f64::from(percent) / 100.0;
+                write!(f, "joint {joint} that turns by {ratio} times its command")
+            }
+            _ => self.fmt_of_commands(f),
+        }
+    }
+}
+
+impl Misreading {
+    /// Writes the description of a misreading of joint columns.
+    fn fmt_of_commands(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::MixedUnits { joints, is_radians } => {
+                let [found, declared] =
+                    if is_radians { ["radians", "degrees"] } else { ["degrees", "radians"] };
+                let numbers = listed_joints(joints);
+                write!(f, "joints {numbers} alone that are in {found}, declared as {declared}")
+            }
+            Self::Cycled { joints: [first, second, third] } => write!(
+                f,
+                "columns of joints {first}, {second} and {third} that hold the angles of joints \
+                 {second}, {third} and {first}"
+            ),
+            Self::ReversedRows => f.write_str("positions in the opposite order of the rows"),
+            Self::Rotated { by } => {
+                let places = if by == 1 { "place" } else { "places" };
+                write!(f, "columns of the joints that are moved on by {by} {places}")
+            }
+            Self::Exchanged { joint, with } => {
+                write!(f, "columns of joints {joint} and {with} that are exchanged")
+            }
+            Self::Coupled { joint, from, is_opposite } => {
+                let sign = if is_opposite { "minus " } else { "" };
+                write!(f, "joint {joint} that also turns by {sign}the command of joint {from}")
+            }
+            Self::Screw { joint, from, lead } => {
+                write!(f, "joint {joint} that also turns once per {lead} mm of joint {from}")
+            }
+            _ => self.fmt_of_loads(f),
+        }
+    }
+
+    /// Writes the description of a misreading of loads, targets, cameras or the joint table.
+    fn fmt_of_loads(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Self::Mass { mass: 0, scale } => write!(f, "masses that are {scale}"),
             Self::Mass { mass, scale } => {
                 write!(f, "mass {mass}, counted along the arm, that is {scale}")
