@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use flexcal::design::{self, CheckedPoses};
 use flexcal::measurement::{Dataset, Measurements};
-use flexcal::problem::Problem;
+use flexcal::problem::{JointKind, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{CheckResult, Document as _};
 
@@ -66,7 +66,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         CheckedPoses::Drawn(..) => "",
     };
     if let CheckedPoses::Table { poses, .. } = &poses {
-        common.hint(poses.still_joints().into_iter().map(|joint| {
+        let is_moved = |joint: &usize| problem.joints[*joint].command_kind() != JointKind::Fixed;
+        common.hint(poses.still_joints().into_iter().filter(is_moved).map(|joint| {
             format!(
                 "joint {} stands still in all poses, so that they do not tell what its other \
                  coordinates would show; vary it",
