@@ -320,6 +320,7 @@ pub fn next(
             explanations: explanations.as_ref(),
             remainder,
             fit: Options::default().with_progress(sink),
+            update: None,
         };
         let next = design::next(&declared, &data, &candidates, &options)?;
         Ok::<_, design::NextError>(Next {

@@ -176,7 +176,7 @@ impl Problem {
                     let updated = update(&problem, &data, &options, &prior, drift_days)?;
                     return Ok((updated.found, updated.predictions));
                 }
-                let found = fit::identify(&problem, &data, &options)?;
+                let mut found = fit::identify(&problem, &data, &options)?;
                 let fitted = match (remainder, declared) {
                     (true, _) => remainder::fit(&found, &problem, &data)?,
                     (false, Some(declared)) => remainder::uncertainty(&found, &problem, &data)?
@@ -184,6 +184,9 @@ impl Problem {
                         .transpose()?,
                     (false, None) => None,
                 };
+                if let Some(fitted) = &fitted {
+                    fitted.judge_held_out(&mut found);
+                }
                 Ok::<_, PriorError>((found, fitted))
             }
         })?;

@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     fit::held_out_positions(&problem, &data)?;
     let options = Options::default().with_strategy(Strategy::Joint).with_solver(SolverChoice::Auto);
     let fit = |sink| fit::identify(&problem, &data, &options.with_progress(sink));
-    let found = Line::during(common.prints_text(), None, fit)?;
+    let mut found = Line::during(common.prints_text(), None, fit)?;
     let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);
     let fitted = if arguments.remainder {
         remainder::fit(&found, &problem, &data)?
@@ -78,6 +78,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let has_remainder = declared.is_some() || corrected.is_some();
     let rows = predicted.as_ref().filter(|_| has_remainder).map(|of| of.rows.as_slice());
     let judged = fit::acceptance(&problem, &data, &found, rows)?;
+    if let Some(rows) = rows {
+        found.judge_corrected(&rows.iter().map(|row| row.position).collect::<Vec<_>>());
+    }
     let file = common.problem_file();
     let inputs = std::iter::once(&file)
         .chain(common.files(&problem))
@@ -134,6 +137,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             )
         } else if verdict == Some(Verdict::Undecided.as_str()) {
             "measure and hold out more poses, then the same command again".to_owned()
+        } else if found.cautions().next().is_some() {
+            format!("read the warnings in {}, then print and sign it", page.display())
         } else {
             format!("print {} and sign it", page.display())
         };

@@ -33,8 +33,12 @@ const INPUT_MISTAKES: [FindingCode; 6] = [
 ];
 
 /// Findings that name rows or columns of the table that are wrong.
-const CORRECTED_IN_TABLE: [FindingCode; 3] =
-    [FindingCode::ColumnDoubted, FindingCode::RowsDoubted, FindingCode::CommandsRounded];
+const CORRECTED_IN_TABLE: [FindingCode; 4] = [
+    FindingCode::ColumnDoubted,
+    FindingCode::RowsDoubted,
+    FindingCode::CommandsRounded,
+    FindingCode::ViewsReversed,
+];
 
 /// Returns what to do after a fit, as a command or in words. `is_structured` is true if the
 /// residual tests detect structure; `estimate` is the path of the estimate.json that was written.
@@ -53,10 +57,14 @@ pub fn after_fit(
         let [problem, estimate] = [common.problem(), estimate].map(shell_word);
         format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv {what}")
     };
-    let ignores_elasticity = found.strategy == Strategy::Rigid && problem.is_elastic();
+    let is_partial = match found.strategy {
+        Strategy::Rigid => problem.is_elastic(),
+        Strategy::OneSweep | Strategy::GeometryOnly | Strategy::StiffnessOnly => true,
+        _ => false,
+    };
     // A remainder in the problem comes from a loop, which has searched for causes already.
-    let search = if ignores_elasticity {
-        format!("flexcal identify {named} fits the elasticity that the problem declares, too")
+    let search = if is_partial {
+        format!("flexcal identify {named} fits all parameters at once, elasticity included")
     } else if problem.remainder.is_some() {
         format!(
             "flexcal trace {named} ranks candidates for what is left; {}",
@@ -68,6 +76,9 @@ pub fn after_fit(
     match report::influential_rows_advice(found, &common.problem_file()) {
         _ if !found.is_trusted() && CORRECTED_IN_TABLE.iter().any(|code| found.has(*code)) => {
             format!("correct the table as the warning says, then flexcal identify {named}")
+        }
+        _ if report::is_prior_contradicted(found) => {
+            format!("flexcal identify {named} fits these rows without the prior")
         }
         // A search for effects would attribute the change to the model, even if the fit is trusted.
         _ if found.has(FindingCode::RowsChanged) => format!(
@@ -113,6 +124,9 @@ pub fn after_fit(
         None if INPUT_MISTAKES.iter().any(|code| found.has(*code)) => format!(
             "correct the table or {file} as the warning says, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
         ),
+        None if found.has(FindingCode::PayloadAtTarget) => format!(
+            "declare the place of the payload in {file} as the warning says, then flexcal identify {named}"
+        ),
         None if found.has(FindingCode::NoiseBeyondDeclared) => search,
         None if !found.is_trusted() || report::determines_nothing(found) => {
             format!("flexcal check {named} says what the poses can tell")
@@ -120,6 +134,12 @@ pub fn after_fit(
         None if found.has(FindingCode::PriorsDecide) => {
             format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
         }
+        None if found.has(FindingCode::BoundInUnidentifiedDirection) => format!(
+            "flexcal identify {named} -v shows what the limits cost; widen those that may be wrong"
+        ),
+        None if found.noise_factor < 1.0 && !exceeds_noise(found) => format!(
+            "declare the smaller σ that the fit assumes in {file}, then flexcal identify {named}"
+        ),
         None if is_structured
             || exceeds_noise(found)
             || found.has(FindingCode::HeldOutBeyondPrediction)
@@ -128,7 +148,7 @@ pub fn after_fit(
             search
         }
         None if found.has(FindingCode::HeldOutNotBetter) => {
-            format!("flexcal check {named} says what the poses can tell")
+            format!("keep the nominal arm, or flexcal next {named} chooses more poses to measure")
         }
         None if found.has(FindingCode::HeldOutOutliers) => {
             format!("check the held-out rows that the warning names; if they are right, {search}")

@@ -26,7 +26,8 @@ to where the nominal arm would have been.
 
 Examples:
   flexcal identify problems/lunar-sampler
-  flexcal compensate problems/lunar-sampler --estimate out/lunar-sampler/estimate.json --data targets.csv")]
+  flexcal compensate problems/lunar-sampler --estimate out/lunar-sampler/estimate.json \\
+    --data targets.csv")]
 pub struct Arguments {
     #[command(flatten)]
     common: Common,

@@ -7,7 +7,7 @@ use clap::builder::RangedU64ValueParser;
 use clap::{ArgGroup, Args, ValueEnum};
 use flexcal::design::Workspace;
 use flexcal::export as code;
-use flexcal::fit::{Placement, SavedEstimate, check_columns};
+use flexcal::fit::{Identification, Placement, SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::mechanics::Arm;
 use flexcal::model::Model;
@@ -37,7 +37,8 @@ use super::{diagnostic, values};
     after_help = "Examples:
   flexcal export panda --estimate out/panda/estimate.json --urdf panda.urdf
   flexcal export panda --estimate out/panda/estimate.json --format ros-yaml --out kinematics.yaml
-  flexcal export panda --estimate out/panda/estimate.json --format dh --best-rigid --workspace-mm=200,700,-400,400,0,800
+  flexcal export panda --estimate out/panda/estimate.json --format dh --best-rigid \\
+    --workspace-mm=200,700,-400,400,0,800
   flexcal export panda --estimate out/panda/estimate.json --format ros-camera --camera hand
   flexcal export panda --estimate out/panda/estimate.json --format c --out model"
 )]
@@ -50,7 +51,7 @@ pub struct Arguments {
     /// The URDF that the problem came from; it is not changed
     #[arg(long, value_name = "ARM.urdf")]
     urdf: Option<PathBuf>,
-    /// Origins of the joints or a camera as YAML, or the whole model as C, instead
+    /// Write another file than a URDF: a table, a camera or the whole model
     #[arg(long, value_name = "FORMAT", ignore_case = true)]
     format: Option<Format>,
     /// Name of the camera that --format ros-camera or opencv writes, if there are several
@@ -240,17 +241,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         format!(
             "{}Next: {}\n",
             report::export_text(&result, &remarks),
-            next_command(arguments, &result, &path)
+            next_command(arguments, &result, (&estimates, &path))
         )
     })?;
-    if let Some(alone) = alone.filter(|alone| !alone.is_trusted()) {
+    // A rigid geometry fitted to an elastic arm always misses measurements by more than σ.
+    let is_strange = |alone: &&Identification| !alone.is_trusted() && !problem.is_elastic();
+    if let Some(alone) = alone.filter(is_strange) {
         diagnostic::warn(&format!("geometry alone: {}", report::why_not_trusted(alone)));
     }
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }
-    // The trust in `alone` has no influence: a rigid geometry fitted to an elastic arm always
-    // misses measurements by more than σ.
+    // The trust in `alone` has no influence.
     Ok(Outcome::from_trust(estimates.trusted))
 }
 
@@ -359,9 +361,16 @@ fn read_data(
 
 /// Returns the command to run next: the same export with the geometry that has the smallest error,
 /// or `flexcal predict` with new measurements.
-fn next_command(arguments: &Arguments, result: &ExportResult, path: &Path) -> String {
+fn next_command(
+    arguments: &Arguments,
+    result: &ExportResult,
+    (estimates, path): (&SavedEstimate, &Path),
+) -> String {
     let [problem, estimate] =
         [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
+    if !estimates.trusted {
+        return format!("flexcal identify {problem} says why the estimate is not to be trusted");
+    }
     if let Some(better) = report::better_geometry(result) {
         let form = match (&arguments.urdf, arguments.format) {
             (Some(urdf), _) => format!("--urdf {}", shell_word(urdf)),
@@ -382,7 +391,12 @@ fn next_command(arguments: &Arguments, result: &ExportResult, path: &Path) -> St
             shell_word(path)
         );
     }
+    let whole = if report::holds_whole_model(result) {
+        ""
+    } else {
+        " of the whole model, not of this file"
+    };
     format!(
-        "flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges new measurements"
+        "flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges predictions{whole} by new measurements"
     )
 }

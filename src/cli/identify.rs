@@ -76,7 +76,8 @@ fn solvers() -> Vec<(&'static str, &'static str, SolverChoice)> {
 /// Prints a warning if few new rows are fitted with a prior and some of them are held out.
 fn warn_of_held_out(problem: &Problem, data: &Dataset) {
     let poses = data.measurements.pose_numbers(problem);
-    let held_out: BTreeSet<usize> = data.split.held_out.iter().map(|&row| poses[row]).collect();
+    let held_out: BTreeSet<usize> =
+        data.split.held_out.iter().filter_map(|&row| poses.get(row).copied()).collect();
     let argument = advice::held_out_argument(problem.data.held_out.as_ref(), &poses);
     if !held_out.is_empty() && !argument.is_empty() {
         let all = poses.into_iter().collect::<BTreeSet<_>>().len();
@@ -127,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .with_solver(arguments.solver)
         .with_influential_rows()
         .with_stop(stop.clone());
-    let (sources, updated, identification) =
+    let (sources, updated, mut identification) =
         Line::during(common.prints_text(), stop, |sink| -> Result<_, PriorError> {
             let options = options.with_progress(sink);
             if let Some(prior) = &prior {
@@ -162,6 +163,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
         (fitted, _) => fitted,
     };
+    if let Some(fitted) = &fitted {
+        fitted.judge_held_out(&mut identification);
+    }
     let mut result =
         IdentificationResult::new(&problem, &identification).with_files(common.files(&problem));
     if let Some(fitted) = &fitted {

@@ -25,7 +25,7 @@ use super::{advice, diagnostic, interrupt};
   flexcal loop problems/ur10-ipa --data session_A.csv session_B.csv session_C.csv
   flexcal identify out/lunar-sampler/problem.closed.toml
 
-Writes loop.json, problem.closed.toml (the problem with the effects that were found declared, a valid input again),
+Writes loop.json, problem.closed.toml (the problem with the effects that were found declared, a valid input again), \
 report.md and report.html, with its figures in figures/.")]
 pub struct Arguments {
     #[command(flatten)]

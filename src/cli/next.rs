@@ -240,13 +240,18 @@ fn next_step(
 ) -> String {
     let common = &asked.common;
     let arguments = common.problem_arguments();
+    if !next.found.is_trusted() {
+        return format!("flexcal identify {arguments} says why the fit is not to be trusted");
+    }
     let flags = asked.flags();
     if !next.found.is_trusted() && next.stop.is_none() {
         return format!("flexcal identify {arguments} says what to correct");
     }
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
-    let lacks = if next.has_large_misfit() && !noise_exceeds {
+    let lacks = if asked.purpose == Purpose::Causes {
+        String::new()
+    } else if next.has_large_misfit() && !noise_exceeds {
         let closed = results.path("problem.closed.toml");
         if Problem::read(&closed).is_ok_and(|closed| closed.name == problem.name) {
             return format!(
@@ -259,14 +264,14 @@ fn next_step(
         format!(
             "flexcal loop {arguments} looks for what the model lacks, because the misfit exceeds the noise; or "
         )
-    } else if next.found.is_trusted() && next.is_out_of_reach(tolerance) && !next.poses.is_empty() {
+    } else if next.is_out_of_reach(tolerance) && !next.poses.is_empty() {
         "choose another --tolerance-mm or a better instrument; to lower the error all the same, "
             .to_owned()
     } else {
         String::new()
     };
     if next.poses.is_empty() {
-        let prior: String = asked.prior_words().iter().map(|word| format!(" {word}")).collect();
+        let prior = asked.prior_words().iter().fold(String::new(), |all, word| all + " " + word);
         return format!("{lacks}flexcal identify {arguments}{prior} writes the estimate to apply");
     }
     let file = shell_word(common.problem());
@@ -297,14 +302,19 @@ fn next_step(
         [_, ..] => {
             let at_hand: Vec<&PathBuf> = files.iter().collect();
             let others = columns_at_hand(&at_hand, (problem, &next.poses), false);
-            let others: String = others.iter().map(|name| format!(", {name}")).collect();
+            let others = others.iter().fold(String::new(), |all, name| all + ", " + name);
             format!("measure {these}, add the columns x_mm, y_mm, z_mm{others}, then")
         }
         [] => format!("measure {these}, add the columns x_mm, y_mm, z_mm, then"),
     };
     let measured: Vec<String> = files.iter().map(|file| shell_word(file)).collect();
+    let command = if asked.purpose == Purpose::Causes {
+        format!("loop {file}")
+    } else {
+        format!("next {file}{flags}")
+    };
     format!(
-        "{lacks}{measure} flexcal next {file}{flags} --data {} {}",
+        "{lacks}{measure} flexcal {command} --data {} {}",
         measured.join(" "),
         shell_word(&results.path("next.csv")),
     )

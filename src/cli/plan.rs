@@ -28,7 +28,8 @@ Examples:
   flexcal plan my-arm --poses 40 --candidates reachable.csv --criterion D
   flexcal plan my-arm --poses 10 --data first.csv --seed 7
   flexcal plan my-arm --poses 30 --workspace-mm=-800,800,-800,800,100,1200 --keep-out-mm 1,0,0,250
-  flexcal plan my-arm --poses 12 --separate 'gear-ratio = { joint = 3 }' 'joint-harmonic = { joint = 3, orders = [1] }'"
+  flexcal plan my-arm --poses 12 --separate 'gear-ratio = { joint = 3 }' \\
+    'joint-harmonic = { joint = 3, orders = [1] }'"
 )]
 pub struct Arguments {
     #[command(flatten)]

@@ -22,11 +22,12 @@ use super::{advice, diagnostic, values};
 #[command(
     mut_arg("data", |arg| arg.help("Tables of poses like measurements; positions are not needed")),
     after_help = "Writes predictions.csv and predictions.html; where the table holds measured positions also residuals.csv and errors.json, the errors of all \
-rows and of each session. A session that the estimate does not know is given a base and a tool fitted to its known rows, with the arm as \
+rows and of each session. A session that the estimate does not know is given a base and a tool fitted to those of its rows that are measured, with the arm as \
 it is.
 
 Examples:
-  flexcal predict problems/lunar-sampler --estimate out/lunar-sampler/estimate.json --data tomorrow.csv
+  flexcal predict problems/lunar-sampler --estimate out/lunar-sampler/estimate.json \\
+    --data tomorrow.csv
   flexcal predict my-arm --data poses.csv"
 )]
 pub struct Arguments {
@@ -125,7 +126,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     });
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
-    let story = report::prediction(&problem, arm, &prediction, (compared, &fitted));
+    // Bounds of an estimate that is not trusted say nothing.
+    let judged = compared.filter(|_| trusted);
+    let story = report::prediction(&problem, arm, &prediction, (judged, &fitted));
     texts.push((RESULT_FILES[3], story.page()));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();

@@ -19,7 +19,8 @@ use super::{diagnostic, values};
 #[command(after_help = "Examples:
   flexcal simulate problems/lunar-sampler --truth TRUTH.toml --poses 78 --seed 1
   flexcal identify problems/lunar-sampler --data out/lunar-sampler/measurements.csv
-  flexcal simulate problems/lunar-sampler --truth TRUTH.toml --data out/lunar-sampler/plan.csv --seed 1 --out out/rehearsed")]
+  flexcal simulate problems/lunar-sampler --truth TRUTH.toml --data out/lunar-sampler/plan.csv --seed 1 \\
+    --out out/rehearsed")]
 pub struct Arguments {
     /// A problem.toml, or the folder that holds one [default: the current folder]
     #[arg(default_value = ".", hide_default_value = true)]

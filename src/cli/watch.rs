@@ -20,7 +20,8 @@ use super::{advice, diagnostic, values};
 #[command(after_help = "Exit status: 0 unchanged, 3 changed.
 
 Examples:
-  flexcal watch problems/lunar-sampler --estimate out/lunar-sampler/estimate.json --data tomorrow.csv")]
+  flexcal watch problems/lunar-sampler --estimate out/lunar-sampler/estimate.json \\
+    --data tomorrow.csv")]
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
@@ -45,7 +46,7 @@ fn drift_argument(days: f64) -> String {
 /// Returns a warning that the rows were measured days after the rows of the estimate, if both have
 /// dates; `None` if less than a day lies between them.
 fn age(estimate: &SavedEstimate, rows: &Measurements) -> Option<String> {
-    let days = estimate.days_until(rows)?.round();
+    let days = estimate.start_times.as_ref()?.days_until(rows)?.round();
     (days >= 1.0).then(|| {
         format!(
             "these rows were measured {days} days after those of the estimate; --drift {days} allows for what changes in that time without \
@@ -109,7 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let watch = life::watch(&problem, &estimate, &rows, settings)?;
     let named = arguments.estimate.display().to_string();
     let json = WatchResult::new(&problem, &named, arguments.drift, &watch).to_json();
-    let story = report::watch(&problem, &watch, &rows);
+    let story = report::watch(&problem, (&watch, estimate.trusted), &rows);
     results.write(&[("watch.json", &json), ("watch.html", &story.page())])?;
     common.print_result(&json, || {
         let file = shell_word(&arguments.estimate);

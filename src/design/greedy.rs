@@ -23,9 +23,10 @@ pub(super) struct Greedy<'a> {
     goal: &'a DMatrix<f64>,
     /// Covariance C of the unknowns, shape = (unknowns, unknowns).
     pub covariance: DMatrix<f64>,
-    /// Products V = C Jᵀ of all candidates.
+    /// Products V = C Jᵀ of the covariance C and the Jacobians J of all candidates, shape =
+    /// (unknowns, coordinates · candidates).
     v: DMatrix<f64>,
-    /// Products T = M V of all candidates.
+    /// Products T = M C Jᵀ of all candidates, shape = (unknowns, coordinates · candidates).
     t: DMatrix<f64>,
 }
 

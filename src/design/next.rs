@@ -257,7 +257,9 @@ pub fn next(
     let posterior = options.update.map(|_| posterior_rows(&site, &found, sensitivity.coordinates));
     if let Some((_, known)) = &posterior {
         // The posterior contains the priors.
-        known.iter().for_each(|&k| unknowns.sigmas[k] = None);
+        for &k in known {
+            unknowns.sigmas[k] = None;
+        }
     }
     let unknowns = match &misfit {
         Some(misfit) => unknowns.and_standard(misfit.weights()),

@@ -21,7 +21,7 @@ use crate::numeric::parallel;
 use crate::problem::{PoseRanges, Problem};
 use crate::random;
 
-/// Number of exchanges, each started from random poses.
+/// Number of exchanges by every criterion but I, each started from random poses.
 const STARTS: usize = 8;
 /// Number of exchanges by the criterion I. Its unknowns include the weights of a misfit, so that an
 /// exchange takes an order of magnitude longer; mean variances after different starts differ by a

@@ -209,8 +209,7 @@ pub enum TableErrorKind {
     #[error(
         "\"{value}\" has a decimal point, and [data.format] says decimal = \",\"; write the \
          number with a comma and without \
-         thousands separators, or correct decimal; in a table with commas between its cells \
-         numbers have points whatever decimal says"
+         thousands separators, or correct decimal"
     )]
     DecimalPoint { value: String },
     #[error("missing; add {write}{}", missing_column_remedy(write, near.as_deref(), unknown))]

@@ -144,8 +144,7 @@ pub enum WarningKind {
     )]
     SessionsAlike { name: String, other: String, rows: usize },
     #[error(
-        "the time is {back} s earlier than in the previous row{}; rows are used in the order of \
-         their times",
+        "the time falls by {back} s here{} (two series?); rows are used in the order of their times",
         additional_rows(*rows)
     )]
     TimeGoesBack { rows: usize, back: String },

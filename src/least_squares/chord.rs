@@ -26,7 +26,8 @@ const NORMAL_RIDGE: f64 = 1e-10;
 /// without effect at x₀, since it may have an effect elsewhere.
 #[derive(Debug)]
 pub(super) struct BasePoint {
-    /// Identifier of the data set.
+    /// Identifier of the data set at which residuals and derivatives were computed; another one
+    /// makes them invalid.
     pub data: u64,
     /// Unit by which the stored residuals were divided, such as 1 σ of a position \[m\].
     unit: f64,
@@ -50,10 +51,11 @@ pub(super) struct Chunk {
 struct Projector {
     /// R₀ S⁻¹, where S = diag(`lengths`) holds the column norms of R₀.
     scaled: DMatrix<f64>,
-    /// Projected residual c₀ at the base point.
+    /// Projected residual c₀ = Q₀ᵀ r₀ at the base point, length n.
     constant: DVector<f64>,
     lengths: DVector<f64>,
-    /// L⁻¹ with L Lᵀ = S⁻¹R₀ᵀR₀S⁻¹ + ridge.
+    /// Inverse Cholesky factor L⁻¹ of the scaled normal matrix: L Lᵀ = S⁻¹R₀ᵀR₀S⁻¹ + ridge, shape =
+    /// (n, n).
     root: DMatrix<f64>,
 }
 
@@ -84,9 +86,11 @@ impl Projector {
 
 /// Linearisation error of one chunk.
 struct ChunkError {
-    /// Gradient change J₀ᵀ ρ of the residual change.
+    /// Vector J₀ᵀ ρ: change of the gradient by the residual change ρ that the derivatives J₀ do not
+    /// predict.
     gradient: DVector<f64>,
-    /// ‖r(x)‖², ‖J₀ δ‖² and ‖ρ‖².
+    /// Sums of squares over the chunk: of the residuals r(x), of their predicted change J₀ δ, and
+    /// of the unpredicted change ρ.
     squares: [f64; 3],
 }
 

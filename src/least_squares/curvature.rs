@@ -8,11 +8,11 @@ const DIFFERENCE_STEP: f64 = 1e-4;
 
 /// Cost, gradient and Gauss–Newton matrix of an objective at one point.
 pub(super) struct QuadraticModel {
-    /// Cost ½‖r‖² at the point.
+    /// Cost ½‖r‖² at the point about which the cost is expanded.
     pub cost: f64,
-    /// Gradient Jᵀr of the cost.
+    /// Gradient Jᵀr of the cost with respect to the unknowns, length n.
     pub gradient: DVector<f64>,
-    /// Gauss–Newton matrix JᵀJ.
+    /// Gauss–Newton matrix JᵀJ of the Jacobian J, shape = (n, n).
     pub normal: DMatrix<f64>,
 }
 

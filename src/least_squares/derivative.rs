@@ -4,9 +4,10 @@ use nalgebra::DVector;
 
 use super::{LeastSquares, jacobian, residual_vector};
 
-/// Largest number of decreasing steps in one extrapolation.
+/// Largest number of decreasing difference steps from which one derivative is extrapolated to step
+/// 0.
 const MAX_EXTRAPOLATION_STEPS: usize = 12;
-/// Ratio of successive difference steps in one extrapolation.
+/// Ratio of successive difference steps, from which a derivative is extrapolated to step 0.
 const STEP_RATIO: f64 = 1.4;
 /// First steps tried, as fractions of an unknown's typical size.
 const INITIAL_STEPS: [f64; 4] = [0.3, 3e-2, 3e-3, 3e-4];
@@ -27,7 +28,7 @@ pub struct ColumnCheck {
 /// Comparison of a Jacobian with differences of the residuals, column by column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JacobianCheck {
-    /// One entry per unknown.
+    /// Comparison of each column of the Jacobian with differences, one entry per unknown.
     pub columns: Vec<ColumnCheck>,
 }
 

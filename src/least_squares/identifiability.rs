@@ -32,7 +32,7 @@ const MAX_CERTAIN_NULL_PIVOT: f64 = 1e-12;
 pub struct Identifiability {
     /// Singular values of the column-scaled Jacobian, largest first.
     pub singular_values: Vec<f64>,
-    /// Number of singular values that are not zero.
+    /// Rank of the Jacobian: number of its singular values that are not zero but for rounding.
     pub rank: usize,
     /// Combinations of unknowns that change no residual.
     pub unidentifiable: Vec<UnidentifiableCombination>,
@@ -51,7 +51,8 @@ pub struct UnidentifiableCombination {
     /// Index and coefficient of each unknown, sorted by index. Unknowns are multiplied by the norm
     /// of their Jacobian column; the coefficients then have unit norm.
     pub weights: Vec<(usize, f64)>,
-    /// Norm of the scaled Jacobian times the combination.
+    /// Norm of the column-scaled Jacobian times the unit vector of the combination: 0 if no
+    /// residual changes.
     pub singular_value: f64,
 }
 

@@ -7,9 +7,9 @@ use super::Block;
 /// Linear residual rows r = A x + b added to the data: priors and gauge conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearRows {
-    /// Matrix A of r = A x + b, shape = (k, n).
+    /// Matrix A of the linear residuals r = A x + b of the unknowns x, shape = (k, n).
     pub matrix: DMatrix<f64>,
-    /// Constant b of r = A x + b, length k.
+    /// Constant b of the linear residuals r = A x + b, length k.
     pub constant: DVector<f64>,
 }
 

@@ -25,7 +25,7 @@ pub enum Loss {
     Squares,
     /// Huber's loss: ρ = s² for s ≤ k, ρ = 2ks − k² beyond [Huber 1964].
     Huber {
-        /// Threshold k of the residual length \[σ\].
+        /// Length k of a residual above which the loss grows linearly \[σ\].
         threshold: f64,
     },
     /// Smoothed absolute length, ρ = 2c (√(s² + ε²) − ε); approximately c s²/ε for s ≪ ε.

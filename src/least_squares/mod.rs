@@ -197,11 +197,11 @@ impl<O: Objective + ?Sized> Objective for &O {
 /// loss weights the rows first.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
-    /// Cost ½‖r‖², or ½Σρ with a robust loss.
+    /// Cost at the point of linearisation: ½‖r‖², or ½ Σ ρ(‖rᵢ‖²) with a robust loss ρ.
     pub cost: f64,
-    /// Triangular factor R, shape = (n, n).
+    /// Triangular factor R of the Jacobian J = Q R, shape = (n, n).
     pub triangle: DMatrix<f64>,
-    /// First n entries of Qᵀr.
+    /// First n entries of Qᵀr, the residual r projected on the columns of the Jacobian J = Q R.
     pub projected: DVector<f64>,
 }
 

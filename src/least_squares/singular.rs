@@ -19,9 +19,9 @@ const MIN_PARALLEL_COLUMNS: usize = 4 * GROUP_COLUMNS;
 /// vector c.
 #[derive(Debug, Clone)]
 pub(super) struct Decomposition {
-    /// Scaled right singular vectors σᵢ vᵢ as columns.
+    /// Right singular vectors vᵢ of the matrix B, each scaled by its singular value σᵢ, as columns.
     pub columns: DMatrix<f64>,
-    /// Singular values σᵢ, in the order of the columns.
+    /// Singular values σᵢ of the matrix B, in the order of `columns`, not sorted.
     pub singular: Vec<f64>,
     /// Projections `uᵢᵀc` of the vector c, in the order of the columns.
     pub projected: DVector<f64>,
@@ -132,9 +132,9 @@ fn sweep(groups: &mut [ColumnGroup]) -> bool {
 /// Group of columns with their squared norms and projections.
 struct ColumnGroup {
     rows: usize,
-    /// Entries of the columns, one column after the other.
+    /// Entries of all columns of the group, one column after the other.
     entries: Vec<f64>,
-    /// Squared norm of each column.
+    /// Squared norm of each column of the group.
     squares: Vec<f64>,
     projected: Vec<f64>,
 }

@@ -12,7 +12,8 @@ use crate::numeric::kernel::{PANEL, dot, dots, norm, subtract, sum_of_squares};
 ///
 /// A wider panel costs more itself and needs fewer passes over the columns behind it.
 const PANEL_WIDTHS: [(usize, usize); 2] = [(WIDE_PANEL, 384), (NARROW_PANEL, MIN_BLOCKED_COLUMNS)];
-/// Number of reflectors in the widest panel.
+/// Number of Householder reflectors that are applied together in the widest panel of the
+/// factorisation.
 const WIDE_PANEL: usize = 96;
 /// Number of reflectors in the narrower panel, and in each part of the widest one.
 const NARROW_PANEL: usize = 32;
@@ -29,7 +30,8 @@ const MIN_BLOCKED_COLUMNS: usize = 128;
 #[derive(Debug, Clone)]
 pub struct Triangle {
     parameters: usize,
-    /// Matrix \[R c\], row after row.
+    /// Triangular factor R of all absorbed rows of the Jacobian with the projected residual c = Qᵀr
+    /// beside it: \[R c\], row after row.
     rows: Vec<f64>,
     /// Sum of squares ‖r‖² of all rows absorbed.
     squares: f64,

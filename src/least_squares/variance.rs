@@ -33,11 +33,13 @@ const GOLDEN_SECTION_RATIO: f64 = 0.618_033_988_749_894_8;
 /// deviation from the prior is not noise. s² = 1 is the variance by which the data were whitened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VarianceLikelihood {
-    /// Values a² and c² of each direction that has a prior.
+    /// For each direction with a prior: squared ratio a² of prior to noise deviation, and square c²
+    /// of the data along it.
     directions: Vec<(f64, f64)>,
-    /// Squared residual ‖y − U c‖² outside the range of A.
+    /// Sum of squares ‖y − U c‖² of the data y that no unknown can explain (outside the range of
+    /// A).
     residual_squares: f64,
-    /// Number m of rows outside the range of A.
+    /// Number m of independent data rows that no unknown can explain (outside the range of A).
     free_rows: f64,
 }
 

@@ -122,7 +122,7 @@ fn has_no_weak_direction(triangle: &DMatrix<f64>) -> bool {
 pub struct StabilisedObjective<'a, O> {
     /// Objective that is minimised.
     pub objective: O,
-    /// Plausible size of each unknown, in its unit.
+    /// Plausible size of each unknown, in the unit of the unknown; `None` if it is not known.
     pub sizes: &'a [Option<f64>],
 }
 

@@ -61,8 +61,9 @@ impl Contradiction {
     }
 
     /// Returns the finding that the new rows contradict the prior in `file`. `index` is the number
-    /// of causes that were found before this one.
-    pub fn finding(&self, index: usize, file: &Path) -> Finding {
+    /// of causes that were found before this one, and `nearest` the first of them if this one is
+    /// larger noise, so that they explain nothing.
+    fn finding(&self, index: usize, nearest: Option<&Self>, file: &Path) -> Finding {
         let is_refitted = self.relocated.is_some() || !self.widened.is_empty();
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
             _ if self.relocated.is_some() => {
@@ -79,23 +80,69 @@ impl Contradiction {
                     .to_owned()
             }
             (false, _) => "; the prior of its parameters was widened".to_owned(),
-            (true, Some(ratio)) => format!("; the fit assumes a σ {ratio:.1} times as large"),
+            (true, Some(ratio)) => format!("; the fit assumes {ratio:.1} times the earlier σ"),
             (true, None) => String::new(),
         };
-        let cause = if index == 0 {
-            "most probable of the causes tried"
-        } else {
-            "with what was found before, they still do; most probable of the further causes tried"
+        let cause = match (nearest, index) {
+            _ if self.noise_ratio.is_some() => {
+                let nearest = nearest.map_or_else(String::new, |of| {
+                    format!(" ({} comes nearest; its prior was widened)", of.label)
+                });
+                format!("no change that was tried explains them{nearest}, only {}", self.label)
+            }
+            (_, index) => {
+                let still = if index == 0 { "" } else { "with that, they still do; " };
+                let probability = 100.0 * self.probability;
+                format!(
+                    "{still}most probable of the changes tried: {} ({probability:.0} %)",
+                    self.label
+                )
+            }
         };
         let text = format!(
-            "the new rows contradict {} (a false alarm in at most one of 100 fits); {cause}: {} \
-             ({:.0} % among them){treatment}",
-            file.display(),
-            self.label,
-            100.0 * self.probability
+            "the new rows contradict {} (a false alarm in at most one of 100 fits); \
+             {cause}{treatment}",
+            file.display()
         );
         let numbers = [json!(self.label), self.probability.into(), json!(is_refitted)];
         Finding::new(FindingCode::EarlierEstimateContradicted, numbers, text)
+    }
+}
+
+/// Returns the findings that new rows contradict the prior in `file`, in the order of the `causes`.
+/// Causes before larger noise do not explain the rows, so one finding stands for all of them.
+pub(super) fn findings(causes: &[Contradiction], file: &Path) -> Vec<Finding> {
+    let noise = causes.iter().position(|cause| cause.noise_ratio.is_some()).unwrap_or(0);
+    let later = causes.iter().enumerate().skip(noise);
+    let nearest = causes[..noise].first();
+    later.map(|(k, cause)| cause.finding(k, nearest.filter(|_| k == noise), file)).collect()
+}
+
+/// Rewrites findings on a fit that a contradicted prior in `file` forces: they say nothing of table,
+/// σ or model. `chi2` is χ² of the new rows under the prior and its degrees of freedom.
+pub(super) fn attribute_to_prior(findings: &mut [Finding], file: &Path, chi2: Option<(f64, f64)>) {
+    let chi2 = chi2.map_or_else(String::new, |(chi2, coordinates)| {
+        format!(" (χ² {chi2:.0} of {coordinates:.0} coordinates)")
+    });
+    for finding in findings {
+        match finding.code {
+            FindingCode::BeyondPrior => {
+                finding.text =
+                    format!("the new rows contradict the prior {}{chi2}", file.display());
+                "these rows are of another arm, or it has changed; fit without --prior"
+                    .clone_into(&mut finding.remedy);
+            }
+            FindingCode::HeldOutWorse
+            | FindingCode::HeldOutBeyondPrediction
+            | FindingCode::HeldOutNotBetter
+            | FindingCode::HeldOutOutliers
+            | FindingCode::NoiseBeyondDeclared
+            | FindingCode::ResidualBeyondDeclared => {
+                "the contradicted prior may cause that: fit without --prior"
+                    .clone_into(&mut finding.remedy);
+            }
+            _ => {}
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::assessment::{Assessment, assess};
 use super::causes::{Cause, CauseKind, Extended};
-use super::contradiction::{Contradiction, most_probable};
+use super::contradiction::{self, Contradiction, most_probable};
 use super::drift;
 use super::earlier::Earlier;
 use super::error::PriorError;
@@ -151,12 +151,15 @@ pub(super) fn identified(
         let cause = cause.filter(|_| is_new_cause && causes.len() < MAX_CAUSES);
         let Some(cause) = cause else {
             causes.extend(contradicting_bound(&model, &found, &original));
-            let findings = causes.iter().enumerate();
-            found.findings.extend(findings.map(|(k, cause)| cause.finding(k, source.file())));
+            let has_raised_sigma = causes.iter().any(|cause| cause.noise_ratio.is_some());
+            if has_raised_sigma {
+                let chi2 = chi2.map(|(chi2, coordinates, _)| (chi2, coordinates));
+                contradiction::attribute_to_prior(&mut found.findings, source.file(), chi2);
+            }
+            found.findings.extend(contradiction::findings(&causes, source.file()));
             found.fitted_rows.extend(original.fitted_rows.iter().cloned());
             found.fitted_rows.sort();
             found.fitted_rows.dedup();
-            let has_raised_sigma = causes.iter().any(|cause| cause.noise_ratio.is_some());
             let labels = causes.into_iter().map(|cause| cause.label).collect();
             found.prior = Some(PriorComparison {
                 days,

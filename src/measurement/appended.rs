@@ -11,7 +11,8 @@ use super::time::DateOrder;
 pub(super) struct Appended {
     /// Number of columns of the table itself, which stand before the appended ones.
     pub columns_before: usize,
-    /// Index in the joint table of each appended column.
+    /// Index of each appended column among those of the joint table, the second file, which holds
+    /// the joint coordinates.
     pub places: Vec<usize>,
     pub format: JointTableFormat,
     /// Row of the joint table whose cells the current row has; `None` if it has none.

@@ -109,12 +109,12 @@ impl JoinedLog {
         let dialect = &problem.data.dialect;
         let mut joined = Self { rule: log.by, location: log.location.clone(), ..Self::default() };
         for file in &log.files {
-            let missing = || match log.is_given {
-                true => Location::file(file).error(InputErrorKind::GivenFileMissing),
-                false => {
-                    let kind = InputErrorKind::DataFileMissing { path: file.clone() };
-                    log.location.clone().error(kind)
+            let missing = || {
+                if log.is_given {
+                    return Location::file(file).error(InputErrorKind::GivenFileMissing);
                 }
+                let kind = InputErrorKind::DataFileMissing { path: file.clone() };
+                log.location.clone().error(kind)
             };
             joined.read_file(Table::open(file, dialect, missing)?, dialect)?;
         }
@@ -310,13 +310,14 @@ impl JoinedLog {
             self.log_times.iter().zip(self.log_times.iter().skip(1)).map(|(a, b)| b - a).collect();
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2)?;
+        let gap = *gaps.get(gaps.len() / 2)?;
         let digit = 10_f64.powf((2.0 * most).log10().floor());
         let tolerance = (2.0 * most / digit).ceil() * digit;
         (gaps.len() >= MIN_CHECKED_ROWS && 10.0 * most < step).then(|| {
             TableErrorKind::ToleranceTooSmall {
                 left: self.unpaired.len(),
                 rows: self.requested,
-                gap: format!("{} s", two_digits(gaps[gaps.len() / 2], 3)),
+                gap: format!("{} s", two_digits(gap, 3)),
                 step: format!("{} s", two_digits(step, 3)),
                 tolerance: two_digits(tolerance, 6),
             }

@@ -81,7 +81,7 @@ pub use dataset::Dataset;
 pub(crate) use order::RowOrder;
 pub(crate) use repeats::count_distinct;
 pub use split::Split;
-pub(crate) use start_times::{StartTimes, is_date};
+pub(crate) use start_times::StartTimes;
 
 /// Measured poses with one column per quantity, in the order of the files.
 #[derive(Debug, Clone, Default)]

@@ -20,18 +20,21 @@ impl StartTimes {
     pub fn of_session(&self, name: &str) -> Option<f64> {
         if self.sessions.is_empty() { Some(self.first) } else { self.sessions.get(name).copied() }
     }
-}
 
-/// Returns true if a time \[s\] is a date, not one of a clock with its own zero.
-pub(crate) fn is_date(time: f64) -> bool {
-    time >= FIRST_DATE
+    /// Returns the days from the first pose of these sessions to the first of `rows`; `None` unless
+    /// both have dates.
+    #[doc(hidden)]
+    pub fn days_until(&self, rows: &Measurements) -> Option<f64> {
+        let later = rows.start_times().first - self.first;
+        (rows.has_dates() && self.first >= FIRST_DATE).then_some(later / 86_400.0)
+    }
 }
 
 impl Measurements {
     /// Returns true if times were measured and are dates, not seconds of a clock with its own zero.
     #[doc(hidden)]
     pub fn has_dates(&self) -> bool {
-        self.time_measured && self.time.iter().all(|&time| is_date(time))
+        self.time_measured && self.time.iter().all(|&time| time >= FIRST_DATE)
     }
 
     /// Returns the time of the first pose of each session.

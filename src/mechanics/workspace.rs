@@ -21,7 +21,7 @@ pub(super) enum Event<S> {
     Axis { at: Vector3<S>, axis: Vector3<S>, pull: Option<S> },
     /// Tilt about two axes: the moments about them are unknown.
     Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
-    /// End of a segment; only in a pass made segment by segment.
+    /// End of a segment; occurs only if the arm is linearised segment by segment.
     Cut,
     /// Fork at which `branches` more branches start besides the one that follows.
     Fork { branches: usize },

@@ -19,7 +19,7 @@ pub struct Kind {
     pub declared_by: &'static str,
     /// Noun for the measured numbers, used in messages about planned rows that lack them.
     pub lacking: &'static str,
-    /// Group and columns of the residuals in tables of results.
+    /// Key of the group of residuals in results, such as `tilt`, and the names of their columns.
     pub residuals: (&'static str, &'static [&'static str]),
     /// Label and unit of the errors, in tables and plots.
     pub error_label: &'static str,

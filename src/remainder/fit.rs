@@ -64,8 +64,9 @@ pub struct Carried {
     pub widening: f64,
     /// Number of new rows that measure positions and are no outliers.
     pub positions: usize,
-    /// Number of new rows that condition the corrections: all that measure positions and are no
-    /// outliers, some of them if they are very many, or none if one has no finite prediction.
+    /// Number of new rows on which the earlier corrections are conditioned: all that measure
+    /// positions and are no outliers, some of them if they are very many, or none if one has no
+    /// finite prediction.
     pub conditioning: usize,
 }
 
@@ -97,6 +98,16 @@ impl Fitted {
             carried: self.carried,
             joints: self.remainder.as_ref().map_or(0, |remainder| remainder.joints().len()),
             held_out: residuals.map(|corrected| corrected.errors.held_out),
+        }
+    }
+
+    /// Judges the held-out rows of `found`, the identification that was corrected, with the
+    /// remainder if one is kept.
+    #[doc(hidden)]
+    pub fn judge_held_out(&self, found: &mut Identification) {
+        if let Some(corrected) = &self.residuals {
+            let errors: Vec<_> = corrected.rows.iter().map(|row| row.position).collect();
+            found.judge_corrected(&errors);
         }
     }
 

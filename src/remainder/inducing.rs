@@ -26,7 +26,8 @@ pub(super) struct Inducing {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Knot {
     pub site: usize,
-    /// Value of the site's input: \[rad\] for angles, otherwise in standard deviations.
+    /// Input at which the function uⱼ of the site is an inducing variable: \[rad\] for angles,
+    /// otherwise standardised (mean 0, standard deviation 1 over the fitted rows).
     pub at: f64,
 }
 

@@ -41,7 +41,6 @@ pub use apply::{CorrectedPrediction, predict};
 pub use correction::{CorrectedPose, Correction};
 pub(crate) use fit::{Carried, MIN_CONFIGURATIONS, Outcome};
 pub use fit::{Fitted, fit};
-pub(crate) use gain::Gain;
 pub(crate) use joint_errors::{JointError, JointErrorPoint};
 pub(crate) use residuals::residuals;
 pub(crate) use saved::{FORMAT, SavedRemainder};

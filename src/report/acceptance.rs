@@ -4,7 +4,7 @@ use super::document::{Block, Headline, Table};
 use super::errors::NOMINAL_ARM;
 use super::remainder::{HELD_OUT, chance_of_bound};
 use super::render::{report, text};
-use crate::fit::Verdict;
+use crate::fit::{Severity, Verdict};
 use crate::problem::Problem;
 use crate::quantity::format::{about_three_digits, counted, number, percent_of};
 use crate::results::{AcceptanceResult, PoseAccuracy, TestedTolerance};
@@ -37,10 +37,12 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
         facts: Vec::new(),
         is_doubtful: !result.trusted,
     };
-    let trust = if result.trusted {
-        "No check of the fit reports an error."
-    } else {
-        "Warning: the fit is not to be trusted."
+    let reported = result.findings.iter().filter(|finding| finding.severity() != Severity::Note);
+    let reported: Vec<String> = reported.map(ToString::to_string).collect();
+    let trust = match (result.trusted, reported.len()) {
+        (false, _) => "The fit is not to be trusted".to_owned(),
+        (true, 0) => "No check of the fit reports an error or a warning".to_owned(),
+        (true, count) => format!("The checks of the fit report {}", counted(count, "warning")),
     };
     let sigma = result.position_sigma_mm.map_or("not declared".to_owned(), |sigma| {
         format!("{} mm per coordinate, 1 σ", number(sigma, 4))
@@ -63,14 +65,19 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
         ))
     });
     let mut blocks = vec![Block::Headline(head)];
+    if !reported.is_empty() {
+        blocks.push(Block::Lines(format!("{trust}:"), reported.clone()));
+    }
     blocks.extend(result.tolerance.as_ref().map(|test| Block::Text(tolerance_text(test))));
     blocks.extend(accuracy_blocks(result));
     blocks.extend([
         Block::heading("How it was measured"),
         Block::Text(format!("Instrument: {instrument}; its noise: {sigma}.")),
         Block::Text(format!(
-            "Poses {}. Rows that were fitted: {}. {trust}",
-            result.protocol, result.identification_rows
+            "Poses {}. Rows that were fitted: {}.{}",
+            result.protocol,
+            result.identification_rows,
+            if reported.is_empty() { format!(" {trust}.") } else { String::new() }
         )),
         Block::Table(conditions),
         Block::heading("Arm and inputs"),

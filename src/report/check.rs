@@ -189,6 +189,10 @@ fn growth_table(check: &Check) -> Table {
 /// States the recommended number of poses.
 fn recommendation(problem: &Problem, check: &Check) -> String {
     match check.growth.enough {
+        Some(enough) if enough < check.forecast.poses => format!(
+            "{enough} such poses suffice ({} are given): they determine every combination of parameters that such poses can determine, and predictions are then as accurate as one measured position. More poses still lower the error (table below).",
+            check.forecast.poses
+        ),
         Some(enough) if let Some(measured) = poses_to_measure(problem, enough) => format!(
             "Measure {measured} poses, of which held_out removes {}: the others determine every combination of parameters that such poses can determine, and predictions are then as accurate as one measured position. More poses still lower the error (table below).",
             measured - enough

@@ -5,7 +5,7 @@ use super::document::{
 };
 use super::errors::{
     DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM, both_parts, error_label, held_out_rows, rows_of,
-    test_rows_word, unpredicted,
+    test_rows_word, unpredicted, with_unit,
 };
 use super::found_effects::{found_effects, found_heading, rounds, status_table};
 use super::identify::{
@@ -19,14 +19,15 @@ use super::render::{Report, report, text};
 use super::residual_tests::{self, other_reduced_chi2};
 use super::unexplained::{structure_places, structure_sentences, to_declare};
 use super::verdict::{
-    alternative, causes, effect_counts, has_place, stand_in_sentence, title, unknown_part, verdict,
+    alternative, causes, effect_counts, has_place, is_less_probable, stand_in_sentence, title,
+    unknown_part, verdict,
 };
 use super::{effect, figures, trace};
 use crate::fit::ErrorSummary;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
 use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResult, nominal_arm};
-use crate::select::ClosedLoop;
+use crate::select::{ClosedLoop, Status};
 
 /// Maximum number of alternatives that a text names; the page names twice as many.
 const MAX_SHOWN_ALTERNATIVES: usize = 4;
@@ -60,8 +61,8 @@ pub fn loop_brief(
     blocks.push(Block::Table(table));
     let bound = accuracy.map_or_else(|| why_no_bound(&closure.after), |accuracy| accuracy.bound);
     let size: Vec<String> =
-        gain_sentence(closure, result, corrected.is_some()).into_iter().chain(bound).collect();
-    blocks.extend((!size.is_empty()).then(|| Block::Text(size.join(" "))));
+        gain_sentences(closure, result, corrected.is_some()).into_iter().chain(bound).collect();
+    blocks.extend((!size.is_empty()).then(|| Block::lines(size.join("\n"))));
     let end = remaining_structure(closure, result)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     // The strongest claims come first.
@@ -94,15 +95,25 @@ fn cause(found: &FoundEffect, max_values: usize) -> Point {
     }
     // If the law only represents an unknown one, its values have no meaning.
     let stand_in = stand_in_sentence(found);
-    let values = values.iter().filter(|_| stand_in.is_none()).map(|value| without_effect(value));
+    let values = values.iter().filter(|_| stand_in.is_none());
+    let values = values.map(|value| effect::without_effect(value, &found.effect.effect));
     let (mut facts, more) = split_at_most(values, max_values);
     facts.extend((more > 0).then(|| "others in loop.json".to_owned()));
+    // The title of a cause that is not sure states the probability.
     let law = match &found.claims {
-        Some(claims) => format!("probability of the law {}", percent(claims.law.probability)),
+        Some(claims) => {
+            format!("probability among the laws tried {}", percent(claims.law.probability))
+        }
         None => "probability of the law not determined".to_owned(),
     };
-    facts.extend(stand_in.is_none().then_some(law));
-    let label = if has_place(found) { "not excluded" } else { "candidates" };
+    facts.extend((stand_in.is_none() && found.status == Status::Found).then_some(law));
+    let label = if !has_place(found) {
+        "candidates"
+    } else if is_less_probable(found) {
+        "more probable"
+    } else {
+        "not excluded"
+    };
     let others = match found.alternatives.as_slice() {
         [] => String::new(),
         [first] => format!("; {label}: {}", alternative(first)),
@@ -111,19 +122,9 @@ fn cause(found: &FoundEffect, max_values: usize) -> Point {
         }
     };
     let facts = (!facts.is_empty()).then(|| facts.join("; "));
-    let details = stand_in.into_iter().chain(facts).collect();
+    let details = stand_in.into_iter().chain(facts).chain(effect::legend(&found.effect.effect));
+    let details = details.collect();
     Point { text: title(found) + &others, details, mark: None }
-}
-
-/// Removes the name of the effect from a text such as "effect[1].parameter = value".
-fn without_effect(value: &str) -> String {
-    let Some((name, _)) = value.split_once(" = ") else { return value.to_owned() };
-    let parameter = name.rsplit('.').next().unwrap_or_default();
-    // Coefficients of the terms of a law are numbered.
-    if parameter.bytes().all(|byte| byte.is_ascii_digit()) {
-        return value.replacen(name, &format!("coefficient {parameter}"), 1);
-    }
-    value.replacen(name, parameter, 1)
 }
 
 /// Returns the beginning of the summary and of the full text: title, counts of rows, verdict, and
@@ -139,8 +140,21 @@ fn head<'a>(
         Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(result, closure.after.sigma_scale < 1.0, &reservations)),
     ];
+    blocks.extend(
+        accuracy.and_then(|accuracy| corrected_sentence(closure, accuracy)).map(Block::Text),
+    );
     blocks.extend(cautions_on_causes(problem, closure, result));
     blocks
+}
+
+/// States that a remainder corrects what is left unexplained; `None` without one.
+fn corrected_sentence(closure: &ClosedLoop, accuracy: &PredictionAccuracy) -> Option<String> {
+    let (before, after) = (&closure.after.fitted.held_out, accuracy.corrected.as_ref()?);
+    Some(format!(
+        "A remainder corrects what is left: with it the mean held-out error is {} instead of {}.",
+        with_unit(after, after.mean.norm),
+        with_unit(before, before.mean.norm)
+    ))
 }
 
 /// Returns the cautions that concern the causes: missing declarations, influential rows, findings,
@@ -171,9 +185,8 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
         None => row.file.clone(),
     };
     let words = format!(
-        "{} {} excluded from the choice of effects, because gross errors lie as far off, or the \
-         model does not hold there: {}. \
-         {treatment}.",
+        "{} {} excluded from the choice of effects (gross errors, or the model does not hold \
+         there): {}. {treatment}.",
         counted(rows.len(), "pose"),
         if rows.len() == 1 { "was" } else { "were" },
         first_of(rows.iter().map(location), MAX_SHOWN_ROWS, "loop.json").join(", ")
@@ -191,7 +204,6 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
         blocks.push(Block::list(failed));
-        blocks.extend(other_reduced_chi2(&closure.before.residual_tests, &closure.before.fit));
     }
     blocks.extend(found_effects(result, MAX_SHOWN_ALTERNATIVES));
     let failed = residual_tests::failed(&closure.residual_tests);
@@ -199,13 +211,8 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         blocks.push(Block::heading("Remaining residual"));
         let unexplained = structure_sentences(problem, closure, result).into_iter();
         // Without found effects, the failed tests are already listed above.
-        let has_failed = !failed.is_empty();
         let failed = failed.into_iter().filter(|_| !result.effects.is_empty());
         blocks.push(Block::list(unexplained.chain(failed)));
-        let is_listed = has_failed && !result.effects.is_empty();
-        blocks.extend(
-            other_reduced_chi2(&closure.residual_tests, &closure.after).filter(|_| is_listed),
-        );
     }
     text(&blocks)
 }
@@ -277,7 +284,6 @@ fn blocks<'a>(
         Block::heading("Residual of the declared problem"),
     ]);
     blocks.extend(residual_tests::blocks(&closure.before.residual_tests));
-    blocks.extend(other_reduced_chi2(&closure.before.residual_tests, &closure.before.fit));
     let traced = TraceResult::new(problem, &closure.before);
     let every = format!("{} writes them all", code("flexcal trace"));
     let mut ranking = trace::ranking(problem, &traced, MAX_SHOWN_CANDIDATES, &every);
@@ -373,8 +379,7 @@ fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let limits = (!held.is_empty() && !result.effects.is_empty()).then(|| {
         format!(
             "Limits are active in the declared fit ({held}). If one is wrong, an effect that was found may only compensate for it. \
-             flexcal identify PROBLEM -v shows how far the error would fall if each limit moved \
-             out by 1 mm, 1 ° or 1 %."
+             flexcal identify PROBLEM -v shows how fast the error falls as each limit moves out."
         )
     });
     untrusted.into_iter().chain(limits).map(Block::Note).collect()
@@ -425,7 +430,7 @@ fn known_gain(result: &LoopResult) -> Option<Gain> {
 
 /// States the gain on the held-out rows with its interval, and the size of the residual, which is
 /// that without a remainder, even if one corrects predictions (`is_corrected`).
-fn gain_sentence(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) -> Option<String> {
+fn gain_sentences(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) -> Vec<String> {
     let after = &closure.after;
     let gain = known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
         let (_, unit) = result.after.errors.judged().norms();
@@ -458,21 +463,28 @@ fn gain_sentence(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) 
     let chi2 = size.map(|size| {
         format!("Reduced χ² (χ²/ν){without}: {size}; {}.{overstated}", expected_interval(after))
     });
-    let words: Vec<String> = gain.into_iter().chain(chi2).collect();
-    (!words.is_empty()).then(|| words.join(" "))
+    gain.into_iter().chain(chi2).collect()
 }
 
 /// States what structure remains in the residual and where it is shown; `None` if no residual test
 /// failed and no place is known.
 fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
-    let failed = residual_tests::failed(&closure.residual_tests).len();
+    let failed = residual_tests::failed(&closure.residual_tests);
     let places = if result.size_alone().is_none() { structure_places(result) } else { Vec::new() };
     let structure = (!places.is_empty())
         .then(|| format!("structure without a known law ({})", places.join("; ")));
-    let tests = (failed > 0).then(|| format!("{} failed", counted(failed, "residual test")));
+    let tests = match failed.as_slice() {
+        [] => None,
+        [test] => Some(format!("a residual test fails: {test}")),
+        [first, others @ ..] => Some(format!(
+            "{} residual tests fail: {first}, and {} more",
+            failed.len(),
+            others.len()
+        )),
+    };
     let parts: Vec<String> = structure.into_iter().chain(tests).collect();
     (!parts.is_empty())
-        .then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))
+        .then(|| format!("What remains: {}. Details: -v or report.html.", parts.join("; ")))
 }
 
 /// States the gain on held-out rows, and the arms that have poses without an equilibrium.
@@ -483,6 +495,6 @@ fn gain_block(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) -> 
         ("the arm as declared, fitted", &before.fit.fitted),
     ];
     arms.extend((!result.effects.is_empty()).then_some(("what was found", &after.fitted)));
-    let words = [gain_sentence(closure, result, is_corrected), unpredicted(&arms)];
-    Block::Text(words.into_iter().flatten().collect::<Vec<_>>().join(" "))
+    let words = gain_sentences(closure, result, is_corrected).into_iter().chain(unpredicted(&arms));
+    Block::Text(words.collect::<Vec<_>>().join(" "))
 }

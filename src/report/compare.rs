@@ -30,9 +30,6 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     };
     let mut blocks = vec![Block::lines(format!("{}\n{parts_of}", problem.title))];
     blocks.push(Block::Text(verdict(comparison)));
-    if concerns_paper(comparison) {
-        blocks.extend(as_paper_tables(comparison));
-    }
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
     blocks.push(Block::Table(grouped_strategies(comparison, true)));
     if !comparison.paper.is_empty() && !problem.effects.is_empty() {
@@ -42,6 +39,9 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     }
     if is_elastic(comparison) {
         blocks.push(Block::Table(ablations(comparison, true)));
+    }
+    if concerns_paper(comparison) {
+        blocks.extend(as_paper_tables(comparison));
     }
     text(&blocks)
 }
@@ -77,11 +77,20 @@ fn verdict(comparison: &Comparison) -> String {
             size(best)
         );
     }
+    let mut equal: Vec<&str> = Vec::new();
+    let as_good = || fits.iter().filter(|fit| size(fit) == size(best));
+    for fit in as_good() {
+        if !equal.contains(&fit.strategy.as_str()) {
+            equal.push(&fit.strategy);
+        }
+    }
+    let of_best = match as_good().count() {
+        1 => format!("{}, {}", best.strategy, best.solver),
+        count => format!("{count} fits, of {}", equal.join(" and ")),
+    };
     format!(
-        "Smallest mean error of the {rows}: {} ({}, {}); largest: {} ({}, {}).",
+        "Smallest mean error of the {rows}: {} ({of_best}); largest: {} ({}, {}).",
         size(best),
-        best.strategy,
-        best.solver,
         size(worst),
         worst.strategy,
         worst.solver

@@ -26,16 +26,6 @@ pub fn commands_text(
         "{}\n{} of {} targets can be reached",
         problem.title, result.reached, result.targets
     );
-    // The text states no distance between target and corrected command, which only the solver
-    // leaves: the expected error of the real arm is larger.
-    if let (Some(before), Some(_)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
-        let _ = write!(
-            words,
-            "; without correction the identified arm would miss them by {} mm on average, \
-             measurement noise left out",
-            number(before, 4)
-        );
-    }
     if let (Some(before), Some(after)) = (result.mean_turn_before_deg, result.mean_turn_deg) {
         let _ = write!(
             words,
@@ -45,8 +35,10 @@ pub fn commands_text(
         );
     }
     if let Some(bounds) = bounds.filter(|_| result.reached > 0) {
-        let what = "Expected error of the corrected commands";
-        let _ = write!(words, ".\n{}", bound_sentence(what, bounds, None));
+        // The text states no distance between target and corrected command, which only the solver
+        // leaves: the expected error of the real arm is larger.
+        let misses: Vec<f64> = commands.iter().map(|command| command.seed_miss).collect();
+        let _ = write!(words, ".\n{}", bound_sentence(bounds, &misses, None));
     } else if result.reached > 0 {
         words += ".\nThe expected error of the commands is not known, because the estimate states no uncertainty of positions.";
     }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
-use statrs::distribution::{ContinuousCDF as _, Normal};
+use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _, Normal};
 
 use super::document::{Block, Column, Table};
 use super::figures::{ACCENT, Drawing, Forest};
@@ -11,15 +11,21 @@ use super::render::Story;
 use crate::fit::SavedEstimate;
 use crate::numeric::{Interval, mean_interval};
 use crate::quantity::Unit;
-use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash};
+use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash, p_value};
 
-/// Probability that any parameter is said to differ although the arm has not changed.
+/// Probability that any parameter is said to differ although the arm has not changed, and the same
+/// for all parameters together.
 const FALSE_ALARM_PROBABILITY: f64 = 0.01;
+/// Smallest eigenvalue of the correlation matrix of the differences, relative to the number of
+/// parameters, at which its direction is tested. Below it rounding decides.
+const MIN_EIGENVALUE: f64 = 1e-12;
 /// Maximum number of parameters that the terminal lists.
 const MAX_LISTED: usize = 20;
 /// Smallest number of common configurations at which the held-out errors of both results are
 /// compared.
 const MIN_COMMON_CONFIGURATIONS: usize = 8;
+/// Largest difference of the nominal values of a parameter of one arm, in σ of its prior.
+const MAX_NOMINAL_SIGMAS: f64 = 5.0;
 /// Number of bootstrap resamples of an interval.
 const RESAMPLES: usize = 5000;
 /// Probability with which an interval covers the mean difference of held-out errors.
@@ -92,11 +98,20 @@ pub(crate) fn difference(sides: &[Side; 2]) -> Story {
     let [a, b] = sides.each_ref().map(|side| &side.estimate);
     let files = [("A", a), ("B", b)].map(|(name, side)| format!("{name}: {}", side.file.display()));
     let mut blocks = vec![Block::Lines("Estimates side by side".to_owned(), files.to_vec())];
-    blocks.extend(declaration_note(a, b).map(Block::Note));
     let shared = a.posterior.fitted_rows.intersection(&b.posterior.fitted_rows).count();
-    blocks.push(Block::Text(verdict(&differences, tested, limit, shared)));
-    blocks.extend(held_out_sentence(sides).map(Block::Text));
-    blocks.extend(notes([a, b], shared).into_iter().map(Block::Note));
+    if are_two_arms(a, b) {
+        blocks.push(Block::Text(format!(
+            "Not comparable: A is of the problem {}, B of {}, which declare different arms.",
+            a.problem_name(),
+            b.problem_name()
+        )));
+    } else {
+        blocks.extend(notes([a, b], shared).into_iter().map(Block::Note));
+        blocks.extend(declaration_note(a, b).map(Block::Note));
+        let joint = joint_test([a, b]);
+        blocks.push(Block::Text(verdict(&differences, (tested, limit), joint, shared)));
+        blocks.extend(held_out_sentence(sides).map(Block::Text));
+    }
     let error = |side: &Side, name: &str| {
         let found = side.errors.iter().find(|error| error.0 == name);
         or_dash(found, |error| number(error.1, 4))
@@ -184,10 +199,51 @@ fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
     found
 }
 
+/// Tests whether all common parameters together differ: χ² = dᵀ (C_A + C_B)⁻¹ d with d = b − a,
+/// its degrees of freedom and its p-value. Well determined combinations of parameters count, which
+/// the single standard errors hide. Rows that both fits use make the test too lenient. `None` if no
+/// parameter has a variance in both.
+fn joint_test([a, b]: [&SavedEstimate; 2]) -> Option<(f64, f64, f64)> {
+    let of_b: Vec<(&str, f64, Option<f64>)> = b.entries().collect();
+    let [in_a, in_b] = [a, b].map(|side| &side.posterior.covariance);
+    let common: Vec<(usize, usize, f64, f64)> = a
+        .entries()
+        .enumerate()
+        .filter_map(|(k, (name, value, _))| {
+            let index = of_b.iter().position(|entry| entry.0 == name)?;
+            let sigma = (in_a[(k, k)] + in_b[(index, index)]).sqrt();
+            (sigma > 0.0).then_some((k, index, of_b[index].1 - value, sigma))
+        })
+        .collect();
+    let n = common.len();
+    let correlation = DMatrix::from_fn(n, n, |i, j| {
+        let (of, with) = (&common[i], &common[j]);
+        (in_a[(of.0, with.0)] + in_b[(of.1, with.1)]) / (of.3 * with.3)
+    });
+    if n == 0 || correlation.iter().any(|entry| !entry.is_finite()) {
+        return None;
+    }
+    let scaled = DVector::from_iterator(n, common.iter().map(|of| of.2 / of.3));
+    let eigen = SymmetricEigen::new(correlation);
+    let along = eigen.eigenvectors.tr_mul(&scaled);
+    let kept = eigen.eigenvalues.iter().zip(&along);
+    let kept: Vec<f64> = kept
+        .filter(|(value, _)| **value > MIN_EIGENVALUE * n as f64)
+        .map(|(value, along)| along * along / value)
+        .collect();
+    let (chi2, freedom) = (kept.iter().sum::<f64>(), kept.len() as f64);
+    Some((chi2, freedom, ChiSquared::new(freedom).ok()?.sf(chi2)))
+}
+
 /// States whether the estimates differ by more than their standard errors allow. `tested` is the
-/// number of parameters with standard errors, `limit` the largest change \[standard errors\], and
-/// `shared` the number of rows to which both were fitted.
-fn verdict(differences: &[Difference], tested: usize, limit: f64, shared: usize) -> String {
+/// number of parameters with standard errors, `limit` the largest change \[standard errors\],
+/// `joint` the [`joint_test`], and `shared` the number of rows to which both were fitted.
+fn verdict(
+    differences: &[Difference],
+    (tested, limit): (usize, f64),
+    joint: Option<(f64, f64, f64)>,
+    shared: usize,
+) -> String {
     let beyond = differences
         .iter()
         .filter(|of| of.sigmas().is_some_and(|sigmas| sigmas.abs() > limit))
@@ -207,14 +263,24 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64, shared: usize)
         counted(tested, "parameter"),
         number(100.0 * FALSE_ALARM_PROBABILITY, 0)
     );
+    let together = joint.map_or_else(String::new, |(chi2, freedom, p)| {
+        let chi2 = number(chi2, 1);
+        format!(" (χ² {chi2} of {freedom}, p {})", p_value(p))
+    });
+    let differ_together = joint.is_some_and(|(.., p)| p < FALSE_ALARM_PROBABILITY);
     match beyond {
+        0 if differ_together => format!(
+            "They differ: no single parameter by more than its error allows ({most}; {test}), but \
+             combinations of them{together}."
+        ),
         0 if shared > 0 => format!(
-            "No parameter differs by more than the errors shown allow ({most}; {test}). That does \
-             not show that they agree: both fits use {}, so these errors are too large.",
+            "No difference is shown, of single parameters ({most}; {test}) or of all together{together}. \
+             That does not show that they agree: both fits use {}, so these errors are too large.",
             counted(shared, "common row")
         ),
         0 => format!(
-            "They agree: no parameter differs by more than its error allows ({most}; {test})."
+            "No difference is shown, of single parameters ({most}; {test}) or of all \
+             together{together}."
         ),
         count => format!(
             "They differ: {} by more than the errors allow ({most}; {test}).",
@@ -268,6 +334,16 @@ fn held_out_sentence(sides: &[Side; 2]) -> Option<String> {
     ))
 }
 
+/// Returns true if the estimates are of problems with other names and nominal values, farther apart
+/// than [`MAX_NOMINAL_SIGMAS`] σ of the prior.
+fn are_two_arms(a: &SavedEstimate, b: &SavedEstimate) -> bool {
+    let is_apart = |(name, _, sigma): (&str, f64, Option<f64>)| {
+        let nominal = a.nominal_of(name).zip(b.nominal_of(name));
+        nominal.zip(sigma).is_some_and(|((a, b), sigma)| (a - b).abs() > MAX_NOMINAL_SIGMAS * sigma)
+    };
+    a.problem_name() != b.problem_name() && a.entries().any(is_apart)
+}
+
 /// States that the two results are of arms with different declarations; `None` if they are not.
 fn declaration_note(a: &SavedEstimate, b: &SavedEstimate) -> Option<String> {
     if let Some([of_a, of_b]) = a.joint_counts(b) {
@@ -281,14 +357,22 @@ fn declaration_note(a: &SavedEstimate, b: &SavedEstimate) -> Option<String> {
     let differs = match part.is_declared {
         [true, false] => format!("Only A declares {name}"),
         [false, true] => format!("Only B declares {name}"),
-        _ => format!("The arms are declared differently: {name}"),
+        _ => format!("The arms are declared differently in {name}"),
     };
     Some(format!("{differs}. The parameters may differ for that reason alone."))
 }
 
-/// Lists what limits the comparison: `shared` common rows, and fits that are not trusted.
+/// Lists what limits the comparison: fits that are not trusted, and `shared` common rows.
 fn notes([a, b]: [&SavedEstimate; 2], shared: usize) -> Vec<String> {
-    let mut notes = Vec::new();
+    let untrusted = [("A", a), ("B", b)].into_iter().filter(|(_, estimate)| !estimate.trusted);
+    let mut notes: Vec<String> = untrusted
+        .map(|(name, _)| {
+            format!(
+                "The fit of {name} is not to be trusted (see its findings), so differences from it \
+                 say little."
+            )
+        })
+        .collect();
     if shared > 0 {
         notes.push(format!(
             "Both fits use {}: the true standard errors of the differences are smaller than shown.",
@@ -298,14 +382,9 @@ fn notes([a, b]: [&SavedEstimate; 2], shared: usize) -> Vec<String> {
     if a.strategy != b.strategy {
         let [of_a, of_b] = [a, b].map(|estimate| estimate.strategy.as_str());
         notes.push(format!(
-            "A was fitted with strategy {of_a}, B with strategy {of_b}: the parameters differ for \
-             that reason alone."
+            "A was fitted with strategy {of_a}, B with strategy {of_b}, so that \
+             parameters can differ for that reason alone."
         ));
-    }
-    for (name, estimate) in [("A", a), ("B", b)] {
-        if !estimate.trusted {
-            notes.push(format!("The fit of {name} was not trusted; see its findings."));
-        }
     }
     notes
 }

@@ -44,6 +44,38 @@ pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<Stri
     largest.chain((smaller > 0).then(|| format!("{smaller} smaller ones in loop.json"))).collect()
 }
 
+/// Removes the name of the effect from a text such as "effect[1].parameter = value". A coefficient
+/// of a law is called after its term.
+pub(super) fn without_effect(value: &str, effect: &Effect) -> String {
+    let Some((name, _)) = value.split_once(" = ") else { return value.to_owned() };
+    let parameter = name.rsplit('.').next().unwrap_or_default();
+    let number: Option<usize> = parameter.parse().ok();
+    let terms = if let Effect::Law(law) = effect { law.formulas() } else { Vec::new() };
+    if let Some(term) = number.and_then(|number| terms.get(number.checked_sub(1)?)) {
+        return value.replacen(name, &format!("coefficient of {term}"), 1);
+    }
+    value.replacen(name, parameter, 1)
+}
+
+/// Explains moments and sides of approach in the formulas of a law; `None` if it has none.
+pub(super) fn legend(effect: &Effect) -> Option<String> {
+    let Effect::Law(law) = effect else { return None };
+    let formulas = law.formulas().join(" ");
+    let words = formulas.split(|c: char| !c.is_ascii_alphanumeric());
+    let mut explained: Vec<String> = words
+        .filter_map(|word| {
+            if let Some(joint) = word.strip_prefix("approach") {
+                return Some(format!("{word}: side from which joint {joint} came, −1 to 1"));
+            }
+            let joint: usize = word.strip_prefix('M')?.parse().ok()?;
+            Some(format!("{word}: moment of the loads about the axis of joint {joint} [N·m]"))
+        })
+        .collect();
+    explained.sort();
+    explained.dedup();
+    (!explained.is_empty()).then(|| explained.join("; "))
+}
+
 /// Sorts the texts of [`values`] so that the values largest in standard errors come first. Texts
 /// that are not one for each parameter keep their order.
 pub(super) fn sort_by_significance(texts: &mut Vec<String>, parameters: &[ParameterValue]) {
@@ -73,7 +105,9 @@ fn value(parameter: &ParameterValue) -> String {
         return format!("({scaled} ± {error})·{power} {}", unit.symbol);
     }
     let digits = decimals(error, MAX_DECIMALS);
-    format!("{} ± {} {}", number(scaled, digits), number(error, digits), unit.symbol)
+    // The symbol of a plain number is 1.
+    let symbol = if unit.symbol == "1" { String::new() } else { format!(" {}", unit.symbol) };
+    format!("{} ± {}{symbol}", number(scaled, digits), number(error, digits))
 }
 
 /// Returns true if an effect acts at a moving joint or at no joint. Lists of effects that the data

@@ -132,7 +132,8 @@ pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
     }
 }
 
-/// States the number of poses without an equilibrium: "3 of 50 held-out poses have no equilibrium".
+/// States the number of poses without an equilibrium (of images also: behind the camera): "3 of 50
+/// held-out poses have no equilibrium".
 pub(super) fn without_equilibrium(of: &ErrorSummary, poses: &str) -> String {
     let is_image = kind_named(of.kind).unit == Unit::Pixel;
     let have = match (is_image, of.unpredicted) {

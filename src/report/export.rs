@@ -57,6 +57,13 @@ pub fn better_geometry(result: &ExportResult) -> Option<&'static str> {
     (mean(&errors.rigid) > MAX_EQUAL_RATIO * least).then_some(option)
 }
 
+/// Returns false if the exported geometry misses the rows clearly farther than the whole model.
+pub fn holds_whole_model(result: &ExportResult) -> bool {
+    result
+        .errors()
+        .is_none_or(|errors| mean(&errors.rigid) <= MAX_EQUAL_RATIO * mean(&errors.whole))
+}
+
 /// States that the rotation β of the last `joint` was not fitted, because the URDF has no origin
 /// behind it.
 pub fn kept_at_end(joint: &str) -> String {
@@ -215,7 +222,9 @@ fn comparison_blocks<'a>(
     let nearest_summary = best_rigid.as_ref().or_else(|| remarks.workspace.and(Some(rigid)));
     let is_surpassed =
         |(nearest, alone): (&Summary, &Summary)| mean(nearest) > MAX_EQUAL_RATIO * mean(alone);
-    if nearest_summary.zip(fitted_alone.as_ref()).is_some_and(is_surpassed) {
+    if remarks.workspace.is_some()
+        && nearest_summary.zip(fitted_alone.as_ref()).is_some_and(is_surpassed)
+    {
         verdict += " --best-rigid is worse here than a geometry fitted alone, because it approximates the whole model over the \
                     whole range of the joints (or --workspace-mm) with base and tool of the whole model; a fit alone adapts base and \
                     tool as well, to the measured poses.";

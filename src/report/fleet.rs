@@ -12,6 +12,8 @@ use crate::quantity::format::{counted, number, or_dash, two_digits};
 const PARAMETER_HEADER: [&str; 5] = ["parameter", "mean", "± 1 σ", "spread", "data sheet"];
 /// Header of the table of arms.
 const ARM_HEADER: [&str; 4] = ["arm", "", "deviates most in", "sigmas"];
+/// Smallest number of arms of which one could be shown to be unlike the others.
+const MIN_JUDGED_ARMS: usize = 5;
 /// Maximum number of decimals of a deviation.
 const MAX_DECIMALS: usize = 5;
 
@@ -19,6 +21,9 @@ const MAX_DECIMALS: usize = 5;
 pub(crate) fn fleet(fleet: &Fleet) -> Story {
     let unlike = fleet.arms.iter().filter(|arm| arm.is_unlike).count();
     let verdict = match unlike {
+        0 if fleet.arms.len() < MIN_JUDGED_ARMS => {
+            "too few to tell whether one is unlike the others".to_owned()
+        }
         0 => "no arm is unlike the others".to_owned(),
         count => format!("{} unlike the others", counted(count, "arm")),
     };

@@ -397,9 +397,13 @@ pub(super) fn rms_and_largest(errors: &ErrorSummary) -> String {
 
 /// Lists active bounds and constraints with their shadow prices; `None` if there are none.
 pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
+    // The price is a slope: the step is so small that the residual could fall by so much.
+    let rms = found.fitted.identification.rms.norm * 1e3;
     let line = |name: &str, price: ShadowPrice, unit: Unit| {
         let (fall, per) = price.in_mm(unit);
-        format!("{name}: {} mm for 1 {per}", two_digits(fall, 6))
+        let steps = [1.0, 0.1, 0.01, 0.001].into_iter();
+        let step = steps.into_iter().find(|step| fall * step < 0.5 * rms).unwrap_or(0.001);
+        format!("{name}: {} mm for {step} {per}", two_digits(fall * step, 6))
     };
     let bound = |estimate: &Estimate| {
         let side = if estimate.at_bound? == AtBound::Lower { "lower" } else { "upper" };
@@ -414,7 +418,7 @@ pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     let points: Vec<String> =
         bounds.chain(found.active_constraints.iter().map(constraint)).collect();
     let words = "Active limits and their cost: decrease of the rms residual if the limit is moved outwards \
-                 by the stated amount\n(standard errors hold with these limits kept):"
+                 a little,\nby its slope at the limit (standard errors hold with these limits kept):"
         .to_owned();
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }

@@ -35,7 +35,7 @@ pub fn init_text(
              pixel_sigma          1 σ of a found corner\n  \
              on                   the frame that carries the camera and the board; now {tip} and the world\n\
              and put measurements.csv beside it, with a row for each corner of each image; \
-             problem.toml lists the columns it needs.\n\
+             problem.toml\nlists the columns it needs.\n\
              Where camera and board are need not be known; the views decide it.\n\
              Next: flexcal identify {word}, then flexcal loop {word}\n"
         );
@@ -48,10 +48,9 @@ pub fn init_text(
          position_sigma_mm  1 σ of a coordinate that your instrument measures; now {SIGMA_MM}\n  \
          held_out           now {} % of the poses are held out to judge the fit\n\
          and put measurements.csv beside it; problem.toml lists the columns it needs. flexcal \
-         check says how many poses to measure,\n\
-         those held out included; flexcal plan counts fitted poses alone. A URDF declares no \
-         elastic links. To look for elastic\n\
-         effects of a link, declare it in [joint.beam]. To look for effects of temperature, give reference_temperature_C and a column\n\
+         check says\nhow many poses to measure, those held out included; flexcal plan counts fitted poses \
+         alone. A URDF declares no\nelastic links. To look for elastic effects of a link, declare it in \
+         [joint.beam]. To look for effects of\ntemperature, give reference_temperature_C and a column \
          temperature_C.\n\
          Next: flexcal check {word} --poses 40, then flexcal loop {word}\n",
         100.0 * HELD_OUT

@@ -53,6 +53,7 @@ pub use identify::{estimate_text, identification_report};
 pub(crate) use init::init_text;
 pub(crate) use noise::influential_rows_advice;
 pub(crate) use predict::prediction;
+pub(crate) use prior::is_prior_contradicted;
 #[doc(hidden)]
 pub use remainder::PredictionAccuracy;
 pub(crate) use remainder::remainder_paragraph;
@@ -74,7 +75,9 @@ pub use self::{
     compare::{compare_text, comparison_report},
     compensate::Doubts,
     compensate::commands_text,
-    export::{ExportRemarks, better_geometry, export_text, kept_at_end, set_up_comment},
+    export::{
+        ExportRemarks, better_geometry, export_text, holds_whole_model, kept_at_end, set_up_comment,
+    },
     figures::is_figure,
     identify::why_not_trusted,
     next::next,

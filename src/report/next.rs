@@ -30,7 +30,8 @@ pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story
     blocks.extend(
         few_in_view(next.candidates, next.drawn, options.workspace.is_some()).map(Block::Text),
     );
-    blocks.push(Block::Text(error_paragraph(next, percent)));
+    let is_trusted = next.found.is_trusted();
+    blocks.extend(is_trusted.then(|| Block::Text(error_paragraph(next, percent))));
     if !next.effects.is_empty() {
         let effects = next.effects.iter().map(crate::problem::Effect::describe);
         let label = if next.effects.len() == 1 {
@@ -40,7 +41,8 @@ pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story
         };
         blocks.push(Block::Lines(label.to_owned(), effects.collect()));
     }
-    blocks.push(Block::figures([draw_errors(options, next, percent)]));
+    let figure = if is_trusted { draw_errors(options, next, percent) } else { None };
+    blocks.push(Block::figures([figure]));
     if !next.steps.is_empty() {
         blocks.push(Block::Table(step_table(options, next, percent)));
         blocks.extend(at_limits(problem, &next.poses, "choose").map(Block::Text));
@@ -64,7 +66,11 @@ fn error_paragraph(next: &NextPoses, percent: &str) -> String {
             mm(error.expected_sigma, 3),
             mm(error.bound, 3),
             next.attainable
-                .map(|least| format!(" As far as these rows tell, no number of further poses brings the rms below {} mm.", mm(least, 3)))
+                .map(|least| format!(
+                    " As far as these rows tell, no number of further poses brings the rms below {} mm or the bound below {} mm.",
+                    mm(least, 3),
+                    mm(attainable_bound(&error), 3)
+                ))
                 .unwrap_or_default(),
             if next.found.noise == Noise::Declared {
                 "The choice allows for"
@@ -160,6 +166,15 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         return "Not judged, because the fit to the measured poses is not to be trusted."
             .to_owned();
     }
+    if options.purpose == Purpose::Causes {
+        let gain: f64 = next.steps.iter().map(|step| step.gain).sum();
+        let poses = counted(next.steps.len(), "pose");
+        return format!(
+            "These {poses} lower the mean variance of the effects below by {} %; flexcal loop with \
+             them says which effect acts.",
+            number(100.0 * gain, 0)
+        );
+    }
     match (next.stop, tolerance.as_ref(), next.enough_after(options.tolerance)) {
         (Some(StopReason::Enough), Some(tolerance), _) => {
             let incomplete = if next.has_large_misfit() {
@@ -186,7 +201,7 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
             lacking(next, options)
         ),
         (Some(StopReason::GainBelowNoise), None, _) => {
-            "Enough: all that further poses can gain is less than the uncertainty of the error itself.".to_owned()
+            "More poses would not help noticeably: all that they can gain is less than the uncertainty of the error itself.".to_owned()
         }
         (Some(StopReason::NoCandidates), ..) => {
             "These are all poses of the pool that are not measured.".to_owned()
@@ -198,6 +213,13 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         (_, Some(tolerance), None) if next.is_out_of_reach(options.tolerance) => format!(
             "Out of reach: no number of further poses can be expected to bring the bound below \
              the tolerance of {tolerance} mm. A better {} is needed.",
+            lacking(next, options)
+        ),
+        (_, Some(tolerance), None)
+            if next.error.zip(options.tolerance).is_some_and(|(error, most)| attainable_bound(&error) > most) => format!(
+            "Probably out of reach with more poses alone: they are expected to bring the bound no \
+             further than {} mm, and the tolerance is {tolerance} mm. A better {} is needed.",
+            next.error.map_or_else(String::new, |error| mm(attainable_bound(&error), 3)),
             lacking(next, options)
         ),
         (_, Some(tolerance), None) if !next.steps.is_empty() && next.error.is_some() => format!(
@@ -220,6 +242,11 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     }
 }
 
+/// Returns the bound that arbitrarily many further poses are expected to reach \[m\].
+fn attainable_bound(error: &WorkspaceError) -> f64 {
+    error.bound * error.least / error.expected
+}
+
 /// Names what must be better for the error bound to fall below the tolerance.
 fn lacking(next: &NextPoses, &NextOptions { tolerance, level, .. }: &NextOptions) -> &'static str {
     match (next.noise_exceeds(tolerance, level), next.has_large_misfit()) {
@@ -232,8 +259,9 @@ fn lacking(next: &NextPoses, &NextOptions { tolerance, level, .. }: &NextOptions
 /// Returns the table of the chosen poses with the error expected after each. `percent` is the level
 /// of the bound.
 fn step_table(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
-    // The error in mm is not judged where cameras measure.
-    let columns = if next.is_of_cameras { 3 } else { 5 };
+    // The error in mm is not judged where cameras measure, or if the fit is not trusted.
+    let is_judged = !next.is_of_cameras && next.found.is_trusted();
+    let columns = if is_judged { 5 } else { 3 };
     let rows = next.steps.iter().enumerate().map(|(k, step)| {
         let mut cells = vec![
             (k + 1).to_string(),
@@ -247,6 +275,9 @@ fn step_table(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
     });
     let header = &["pose", "travel", "gain", "rms, mm", "bound, mm"][..columns];
     let goal = match options.purpose {
+        Purpose::Accuracy if next.is_of_cameras => {
+            "mean variance of predictions that parameters cause"
+        }
         Purpose::Accuracy => {
             "mean variance of predictions that parameters and assumed misfit cause"
         }
@@ -259,6 +290,6 @@ fn step_table(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
     let errors = format!(
         "; rms, bound ({percent} %): expected error in the workspace after the pose, with noise and the misfit that no pose lowers"
     );
-    let note = if next.is_of_cameras { note } else { note + &errors };
+    let note = if is_judged { note + &errors } else { note };
     Table::new(header, rows.collect(), &[]).noted(&[&note])
 }

@@ -48,10 +48,23 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
             expected_interval(found),
             other_sigma(problem, found)
         ),
-        ResidualSize::Expected(chi2) => format!(
-            "Reduced χ² (χ²/ν) is {}: the model explains the data to the declared σ.",
-            number(chi2, 2)
-        ),
+        ResidualSize::Expected(chi2) => {
+            let (aside, of) = found
+                .finding(FindingCode::RowsSetAside)
+                .and_then(|finding| Some((finding.value("rows")?.as_u64()?, finding.number("of")?)))
+                .map_or((0, 0.0), |(rows, of)| (rows, of));
+            let (what, left) = if aside > 0 {
+                let others =
+                    format!("the {:.0} rows that the robust loss counts", of - aside as f64);
+                (others, format!("; {aside} of {of:.0} rows are set aside"))
+            } else {
+                ("the data".to_owned(), String::new())
+            };
+            format!(
+                "Reduced χ² (χ²/ν) is {}: the model explains {what} to the declared σ{left}.",
+                number(chi2, 2)
+            )
+        }
         ResidualSize::Unclear(chi2) => {
             let (size, what) =
                 if chi2 > 1.0 { ("larger", "explains") } else { ("smaller", "predicts") };

@@ -6,7 +6,7 @@ use crate::fit::{ActiveConstraint, Estimate, Identification, PriorSize, open_qua
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
 use crate::problem::{JointKind, Problem};
-use crate::quantity::format::{MAX_DECIMALS, decimals, number, or_dash, two_digits};
+use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash, two_digits};
 use crate::results::{Knowledge, LargestHarmonics};
 
 /// Number of decimals of a value without a standard error.
@@ -274,10 +274,9 @@ pub(super) fn more_unidentifiable<'a>(found: &Identification, file: &str) -> Opt
     let words: Vec<String> =
         unidentifiable.map(|combination| combination_words(combination, &found.unknowns)).collect();
     let count = words.len();
-    let on_paper = format!("{count} more are left out on paper: they are in {file}.");
-    (count > 0).then(|| {
-        Block::Folded(format!("{count} more combinations"), vec![Block::list(words)], on_paper)
-    })
+    let title = counted(count, "more combination");
+    let on_paper = format!("{title} left out on paper: see {file}.");
+    (count > 0).then(|| Block::Folded(title, vec![Block::list(words)], on_paper))
 }
 
 /// Formats a combination as a sum of parameters with their coefficients, the largest first.

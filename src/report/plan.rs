@@ -12,6 +12,9 @@ use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 
+/// Smallest ratio of the planned to the random standard error at which a text says that it is larger.
+const MIN_GROWTH: f64 = 1.1;
+
 /// States whether the planned poses determine all combinations of parameters that such poses can
 /// determine.
 fn sufficiency<'a>(plan: &Plan) -> Block<'a> {
@@ -71,8 +74,9 @@ pub fn plan(
         let (factor, than) = if gain < 1.0 { (1.0 / gain, "LARGER") } else { (gain, "smaller") };
         Block::Text(format!(
             "These poses make the standard errors {factor:.2} times {than} than random poses do (geometric mean of the {} parameters \
-             of the arm that random poses identify well).",
-            meaningful.len()
+             of the arm that random poses identify well){}.",
+            meaningful.len(),
+            worse_than_random(plan)
         ))
     });
     let names: Vec<String> =
@@ -107,6 +111,26 @@ pub fn plan(
         Block::Table(command_table(problem, &plan.poses)),
     ]));
     Story::new(&problem.title, "plan", blocks)
+}
+
+/// Names the parameter whose standard error grows most against random poses, with the number of
+/// those that grow; empty if none grows noticeably.
+fn worse_than_random(plan: &Plan) -> String {
+    let expected = plan.planned.expected.iter().enumerate();
+    let grown = expected.filter_map(|(k, expected)| {
+        let ratio = expected.std_error? / plan.random_error(k)?;
+        (ratio > MIN_GROWTH && ratio.is_finite()).then_some((ratio, &expected.name))
+    });
+    let grown: Vec<(f64, &String)> = grown.collect();
+    match grown.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((ratio, name)) => {
+            format!(
+                "; larger for {}, most for {name} ({ratio:.1} times)",
+                counted(grown.len(), "parameter")
+            )
+        }
+        None => String::new(),
+    }
 }
 
 /// Returns the letter of a criterion with the quantity that it minimises.

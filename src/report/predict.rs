@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 
 use super::document::{Block, Table, opening};
-use super::errors::{error_label, mean_rms_max};
+use super::errors::{error_label, mean_rms_max, with_unit};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series, WARM};
-use super::remainder::bound_sentence;
+use super::remainder::{bound_sentence, contradiction};
 use super::render::Story;
 use super::row_kinds::unsteady_points;
-use crate::fit::{ErrorSummary, Prediction};
+use crate::fit::{ErrorSummary, Prediction, rows_of_kind};
 use crate::problem::Problem;
-use crate::quantity::format::{counted, mm, percent_of};
+use crate::quantity::format::{counted, percent_of};
 use crate::remainder::{Bounds, Compared};
 
 /// Returns the predictions, with a figure of the errors of measured rows. `arm` describes the arm
@@ -22,12 +22,20 @@ pub(crate) fn prediction(
     prediction: &Prediction,
     (compared, fitted): (Option<Compared>, &[usize]),
 ) -> Story {
-    let mut words = format!("{} predicted for {arm}", counted(prediction.positions.len(), "pose"));
+    let count = prediction.positions.len();
+    let single_kind = prediction.errors.as_ref().filter(|errors| errors.kinds.is_empty());
+    let rows = match single_kind.map(|errors| errors.all.kind) {
+        Some(kind) if kind != "position" => format!("{count} {}", rows_of_kind(kind)),
+        _ => counted(count, "pose"),
+    };
+    let mut words = format!("{rows} predicted for {arm}");
     let lost = prediction.lost_rows().len();
     if lost > 0 {
         let _ = write!(words, "; {lost} of them have no equilibrium");
     }
     let mut blocks = opening(&problem.title, words).to_vec();
+    let contradiction = compared.filter(|_| fitted.is_empty()).and_then(contradiction);
+    blocks.extend(contradiction.clone().map(Block::Text));
     if !prediction.placed.is_empty() {
         let names = prediction.placed.join(", ");
         blocks.push(Block::lines(format!("Fitted to these rows, with the arm held: {names}")));
@@ -59,8 +67,8 @@ pub(crate) fn prediction(
     blocks.extend(fitted_rows_sentence(prediction, fitted).map(Block::Text));
     blocks.extend(compared.filter(|_| lost == 0).map(|compared| {
         let suffices = 3 * compared.errors.len() > prediction.placed.len();
-        let measured = Some(compared).filter(|_| suffices);
-        Block::lines(bound_sentence("Expected error", compared.bounds, measured))
+        let measured = Some(compared).filter(|_| suffices && contradiction.is_none());
+        Block::lines(bound_sentence(compared.bounds, &[], measured))
     }));
     let unsteady = unsteady_points(&prediction.spreads);
     if !unsteady.is_empty() {
@@ -78,7 +86,7 @@ fn is_of_positions(prediction: &Prediction) -> bool {
 }
 
 /// States to how many of the predicted rows the arm was fitted, and the error of the others if all
-/// rows measure positions; `None` if it was fitted to no row.
+/// rows are of one kind; `None` if it was fitted to no row.
 fn fitted_rows_sentence(prediction: &Prediction, fitted: &[usize]) -> Option<String> {
     let residuals = prediction.residuals.as_ref().filter(|_| !fitted.is_empty())?;
     let others = residuals.iter().enumerate().filter(|(row, _)| fitted.binary_search(row).is_err());
@@ -88,15 +96,15 @@ fn fitted_rows_sentence(prediction: &Prediction, fitted: &[usize]) -> Option<Str
         let words = "The arm was fitted to all of these rows: errors of new poses are larger.";
         return Some(words.to_owned());
     }
-    if !is_of_positions(prediction) {
+    let Some(of) = prediction.errors.as_ref().filter(|errors| errors.kinds.is_empty()) else {
         return Some(format!("The arm was fitted to {count} of these rows."));
-    }
+    };
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     let largest = errors.iter().copied().fold(0.0, f64::max);
-    let [mean, largest] = [mean, largest].map(|length| mm(length, 4));
+    let [mean, largest] = [mean, largest].map(|error| with_unit(&of.all, error));
     Some(format!(
-        "The arm was fitted to {count} of these rows; the error of the {} others is {mean} mm in the \
-         mean, {largest} mm at most.",
+        "The arm was fitted to {count} of these rows; the error of the {} others is {mean} in the \
+         mean, {largest} at most.",
         errors.len()
     ))
 }

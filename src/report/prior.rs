@@ -78,10 +78,18 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
     }
     let verdict = match comparison.causes.as_slice() {
         [] => match comparison.chi2 {
-            Some((.., p)) if p >= MIN_AGREEING_P => ". They agree.".to_owned(),
+            Some((.., p)) if p >= MIN_AGREEING_P => ". No contradiction is shown.".to_owned(),
             Some(_) => ". That is improbable, but no single cause explains it.".to_owned(),
             None => ". Their agreement could not be tested.".to_owned(),
         },
+        [nearest, .., _] if comparison.has_raised_sigma => {
+            format!(
+                ". They disagree, and no change that was tried explains that ({nearest} comes nearest)."
+            )
+        }
+        _ if comparison.has_raised_sigma => {
+            ". They disagree, and no change that was tried explains that.".to_owned()
+        }
         causes => {
             // χ² counts all coordinates alike, so that a small change of one kind may leave it as
             // expected.
@@ -94,6 +102,12 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
         }
     };
     text + &verdict
+}
+
+/// Returns true if the new rows contradict the prior of a fit, and no change that was tried explains
+/// that.
+pub fn is_prior_contradicted(found: &Identification) -> bool {
+    found.prior.as_ref().is_some_and(|prior| prior.has_raised_sigma)
 }
 
 /// States that the new rows contradict the earlier estimate; `None` if they do not.

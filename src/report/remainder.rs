@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use super::document::{Block, Column, Table, code};
 use super::figures;
 use super::render::text_width;
-use crate::fit::{ErrorSummary, Identification};
+use crate::fit::{ErrorSummary, FindingCode, Identification};
 use crate::quantity::format::{counted, mm, number, percent_of, two_digits};
 use crate::remainder::{
-    BoundTest, Bounds, Carried, Compared, Gain, JointError, MIN_CONFIGURATIONS, Outcome,
+    BoundTest, Bounds, Carried, Compared, JointError, MIN_CONFIGURATIONS, Outcome,
 };
 use crate::results::PlotData;
 
@@ -39,31 +39,39 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     };
     let [without, with] = [gain.without, gain.with].map(|error| number(error * 1e3, 4));
     match after {
-        Some(after) => format!(
+        Some(_) => format!(
             "A remainder (smooth correction) at {} is kept, because it improves the prediction of poses left out of its fit: the mean \
              error of left-out configurations falls from {without} mm to {with} mm{held_out}.",
             counted(outcome.joints, "joint"),
             held_out = if found.fitted.is_left_out {
                 String::new()
             } else {
-                format!(", that of held-out poses goes from {before} mm to {after} mm")
+                held_out_gain(&found.fitted.held_out, outcome.held_out.as_ref())
             },
         ),
         None => format!(
             "No remainder (smooth correction) is kept, because it {predicts}: mean error \
-             {without} mm without it, {with} mm with it. The gain is {} standard errors (more \
-             than {} are needed); the log \
-             predictive density changes by {} per row, {} standard errors (more than {} are needed), \
-             the log likelihood by {} (more than {} is needed).",
-            number(gain.error.ratio(), 2),
-            number(gain.threshold(), 2),
-            number(gain.density.mean, 2),
-            number(gain.density.ratio(), 2),
-            number(gain.density_threshold(), 2),
-            number(gain.ln_evidence, 2),
-            number(Gain::least_evidence(), 2),
+             {without} mm without it, {with} mm with it.",
         ),
     }
+}
+
+/// States the mean error of held-out poses without and with a remainder, and the largest one if it
+/// grows.
+fn held_out_gain(before: &ErrorSummary, after: Option<&ErrorSummary>) -> String {
+    let Some(after) = after else { return String::new() };
+    let shown = |length: f64| number(length * 1e3, 4);
+    let [from, to] = [before, after].map(|of| shown(of.mean.norm));
+    let mut words = if after.mean.norm > MAX_CLEAR_RATIO * before.mean.norm {
+        format!("; that of held-out poses hardly changes ({from} mm to {to} mm)")
+    } else {
+        format!(", that of held-out poses from {from} mm to {to} mm")
+    };
+    if after.max.norm > before.max.norm {
+        let [from, to] = [before, after].map(|of| shown(of.max.norm));
+        let _ = write!(words, "; the largest rises from {from} mm to {to} mm");
+    }
+    words
 }
 
 /// Returns the sentences on a remainder as a paragraph of a screen.
@@ -205,7 +213,12 @@ impl PredictionAccuracy {
         } else {
             format!(", of which {} % is far from all measured poses", number(far, 0))
         };
-        let kept = contradicted_bound(uncertainty.test.as_ref(), HELD_OUT);
+        let mut kept = contradicted_bound(uncertainty.test.as_ref(), HELD_OUT);
+        let errors = held_out.as_ref().unwrap_or(&found.fitted.held_out);
+        if kept.is_empty() && found.has(FindingCode::HeldOutOutliers) {
+            let [rms, max] = [errors.rms.norm, errors.max.norm].map(|of| number(of * 1e3, 2));
+            kept = format!(" But the held-out poses err by {rms} mm rms, {max} mm at most.");
+        }
         let contradicted = uncertainty.test.filter(BoundTest::is_contradicted);
         let bound = (mean.is_finite() && found.is_trusted()).then(|| {
             format!(
@@ -254,6 +267,9 @@ pub(super) fn chance_of_bound(test: Option<&BoundTest>, noun: &str) -> String {
     }
 }
 
+/// Largest ratio of an error with a correction to that without it, at which the correction makes a
+/// difference.
+const MAX_CLEAR_RATIO: f64 = 0.95;
 /// Largest error, relative to the expected error, at which measured positions are probably
 /// predictions of the model itself. Tables round positions to 0.1 µm.
 const MAX_COMPUTED_ERROR: f64 = 2e-3;
@@ -266,41 +282,85 @@ fn are_predicted(bounds: &Bounds, errors: &[(usize, f64)]) -> bool {
         && largest <= MAX_COMPUTED_ERROR * bounds.expected()
 }
 
-/// States the expected error, which `what` names, and its bound, both as root mean squares over the
-/// poses. With
+/// States the expected error and its bound, both as root mean squares, for the poses within the
+/// range of the fitted ones and for the others. `misses` are the position errors \[m\] of uncorrected
+/// commands by pose, measurement noise left out; empty if no commands are corrected. With
 /// `compared`, adds the share of rows within their bounds and what the test says.
-pub(super) fn bound_sentence(what: &str, bounds: &Bounds, compared: Option<Compared>) -> String {
+pub(super) fn bound_sentence(
+    bounds: &Bounds,
+    misses: &[f64],
+    compared: Option<Compared>,
+) -> String {
     let compared = compared.filter(|compared| !compared.errors.is_empty());
-    let test = compared.and_then(|compared| compared.test);
-    let squares = (0..bounds.poses.len()).map(|pose| bounds.bound(pose).powi(2));
-    let bound = (squares.sum::<f64>() / bounds.poses.len() as f64).sqrt();
-    let mut words = format!(
-        "{what} {} mm rms, measurement noise included; the {} % bound is {} mm rms",
-        number(bounds.expected() * 1e3, 3),
-        percent_of(bounds.level),
-        number(bound * 1e3, 3),
-    );
+    let (beyond, within): (Vec<usize>, Vec<usize>) =
+        (0..bounds.poses.len()).partition(|&pose| bounds.poses[pose].is_extrapolated);
+    let rms = |poses: &[usize], of: &dyn Fn(usize) -> f64| {
+        let squares = poses.iter().map(|&pose| of(pose).powi(2));
+        (squares.sum::<f64>() / poses.len() as f64).sqrt()
+    };
+    let expected = |poses: &[usize]| rms(poses, &|pose| bounds.poses[pose].size);
+    let shown = |length: f64| number(length * 1e3, 3);
+    let bound = |poses: &[usize]| shown(rms(poses, &|pose| bounds.bound(pose)));
+    let main = if within.is_empty() { &beyond } else { &within };
+    let level = percent_of(bounds.level);
+    let mut words = if misses.is_empty() {
+        format!("Expected error {} mm rms, measurement noise included.", shown(expected(main)))
+    } else {
+        let uncorrected = rms(main, &|pose| {
+            bounds.poses[pose].size.hypot(misses.get(pose).copied().unwrap_or(0.0))
+        });
+        let hardly = if expected(main) > MAX_CLEAR_RATIO * uncorrected {
+            " The correction hardly changes it."
+        } else {
+            ""
+        };
+        format!(
+            "Expected error at the targets, measurement noise included: {} mm rms without \
+             correction, {} mm rms with it.{hardly}",
+            shown(uncorrected),
+            shown(expected(main))
+        )
+    };
+    let _ = write!(words, " The {level} % bound is {} mm rms.", bound(main));
     if let Some(compared) = compared
         && are_predicted(bounds, compared.errors)
     {
-        words += "; the positions of these rows are predictions of the model, such as targets of commands.csv, so their errors verify \
-                  nothing";
+        words += " The positions of these rows are predictions of the model, such as targets of commands.csv, so their errors verify \
+                  nothing.";
     } else if let Some(compared) = compared {
         let share = bounds.coverage(compared.errors.iter().copied());
         let share = number(share * 100.0, 1);
-        let _ = write!(words, "; {share} % of these rows lie within their bounds");
+        let _ = write!(words, " {share} % of these rows lie within their bounds.");
     }
-    let beyond = bounds.poses.iter().filter(|pose| pose.is_extrapolated).count();
-    if beyond > 0 {
-        let poses = counted(beyond, "pose");
-        let lie = if beyond == 1 { "lies" } else { "lie" };
-        let _ = write!(
-            words,
-            "; {poses} {lie} outside the range of the fitted poses, with wider bounds"
-        );
+    if !beyond.is_empty() {
+        let poses = counted(beyond.len(), "pose");
+        let lie = if beyond.len() == 1 { "lies" } else { "lie" };
+        let _ = write!(words, " {poses} {lie} outside the range of the fitted poses");
+        let _ = if within.is_empty() {
+            write!(words, ", where errors may be larger.")
+        } else {
+            let (rms, bound) = (shown(expected(&beyond)), bound(&beyond));
+            write!(words, ": {rms} mm rms there, bound {bound} mm.")
+        };
     }
-    let chance = chance_of_bound(test, "configurations that were not fitted");
-    if chance.is_empty() { words } else { format!("{words}.{chance}") }
+    let test = compared.and_then(|compared| compared.test);
+    words + &chance_of_bound(test, "configurations that were not fitted")
+}
+
+/// States that rows contradict an estimate that was fitted to none of them: their error, the
+/// expected one, and how many lie within their bounds; `None` if they do not.
+pub(super) fn contradiction(compared: Compared) -> Option<String> {
+    let test = compared.test.filter(|test| test.is_contradicted())?;
+    let squares = compared.errors.iter().map(|(_, length)| length * length);
+    let rms = (squares.sum::<f64>() / compared.errors.len() as f64).sqrt();
+    Some(format!(
+        "The rows contradict the estimate: {} mm rms, {} mm expected, {} of {} configurations \
+         within their bounds. Another arm, or this one has changed.",
+        number(rms * 1e3, 3),
+        number(compared.bounds.expected() * 1e3, 3),
+        test.within,
+        test.of
+    ))
 }
 
 #[cfg(test)]

@@ -87,9 +87,9 @@ fn verdict(result: &TraceResult) -> String {
                 warnings name."
             .to_owned();
     }
-    let structure = if let Some(size) = result.size_alone() {
-        let size = number(size, 1);
-        format!("The residual is {size} × the declared σ, and the residual tests show no structure")
+    let structure = if result.size_alone().is_some() {
+        "The residual is larger than the declared σ explains, but no test shows on what it depends"
+            .to_owned()
     } else if result.structured {
         "The residual has structure".to_owned()
     } else if !result.is_testable() {

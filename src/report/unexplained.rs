@@ -195,7 +195,7 @@ fn structure_sentence(structure: &Structure) -> String {
             p_value(structure.p_value)
         );
     };
-    let chance = format!("p at most {}", p_value(structure.p_value));
+    let chance = format!("p at most {} if only noise is left", p_value(structure.p_value));
     let law = percent(claims.law.probability);
     if let Some(limit) = &structure.limit {
         return format!(
@@ -244,7 +244,7 @@ fn correction_sentences(
     let mut sentences = vec![format!(
         "A smooth function fitted at this place alone {improves} the prediction of held-out poses: mean {} to {} {unit}, rms {} to {} \
          {unit}. For identification poses left out in turn the rms changes from {} to {} {unit}. The function shows how much of the \
-         error lies there; it names no cause, and no file contains it.",
+         error lies there; it is not the remainder.",
         show(mean_before),
         show(mean),
         show(rms_before),

@@ -42,7 +42,7 @@ pub(super) fn verdict(
     } else {
         ""
     };
-    let mut outcome = outcome(result, assumes_smaller_sigma);
+    let mut outcome = outcome(result, assumes_smaller_sigma, reservations);
     let is_settled = result.verdict != Verdict::Unexplained || result.is_probably_explained();
     if result.trusted && is_settled && !reservations.is_empty() {
         outcome.truncate(outcome.trim_end_matches('.').len());
@@ -66,7 +66,7 @@ pub(super) fn causes(result: &LoopResult) -> impl Iterator<Item = &FoundEffect> 
 }
 
 /// States the outcome of a loop, apart from interruption and influential rows.
-fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
+fn outcome(result: &LoopResult, assumes_smaller_sigma: bool, reservations: &[String]) -> String {
     if !result.trusted {
         return "No cause is claimed, because the fit is not to be trusted. Correct first what the warnings name.".to_owned();
     }
@@ -91,8 +91,16 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
         (Verdict::Unexplained, true) => {
             let failed = result.checks_after.iter().find(|test| test.failed);
             let noise = if result.is_contradicted() {
-                " Held-out rows or rows that were set aside contradict the fit: see the warnings."
-                    .to_owned()
+                let what = match reservations {
+                    [] => "see the warnings".to_owned(),
+                    said => said.join("; "),
+                };
+                let among = if causes(result).any(FoundEffect::is_doubted) {
+                    ". Probabilities are among the laws tried, none of which explains these rows"
+                } else {
+                    ""
+                };
+                format!(" Rows contradict the fit: {what}{among}.")
             } else if result.with_status(Status::Contradicted).next().is_some() {
                 String::new()
             } else if let Some(test) = failed {
@@ -102,7 +110,7 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
                     test.words
                 )
             } else {
-                " With what is in the model, the residual looks like noise.".to_owned()
+                " The residual looks like noise, but its cause is not sure.".to_owned()
             };
             format!("Unexplained: {}.{noise}", with_lower_initial(&found))
         }
@@ -174,13 +182,21 @@ fn found_clause(result: &LoopResult) -> String {
             // Without a place and a law, the alternatives are candidates and no rivals.
             let is_unknown = !has_place(cause) && stand_in_sentence(cause).is_some();
             let or_else = rival.map_or_else(String::new, |rival| {
+                let rival = alternative(rival);
                 if is_unknown {
-                    format!("; the most probable candidate: {}", alternative(rival))
+                    format!("; the most probable candidate: {rival}")
+                } else if is_less_probable(cause) {
+                    format!(", more probable: {rival}")
                 } else {
-                    format!(", or else {}", rival.effect.description)
+                    format!(", or else {rival}")
                 }
             });
             format!("; {}{or_else}", claim(cause, &cause.effect.description))
+        }
+        [first, second] if doubted.iter().all(|cause| cause.status == Status::Probable) => {
+            let [first, second] =
+                [first, second].map(|cause| claim(cause, &cause.effect.description));
+            format!("; {first}; {second}")
         }
         causes => {
             let probable = causes.iter().filter(|cause| cause.status == Status::Probable).count();
@@ -259,6 +275,12 @@ fn claim(found: &FoundEffect, words: &str) -> String {
 /// Returns true if the place of a cause is more probable than not, or if no evidence was evaluated.
 pub(super) fn has_place(found: &FoundEffect) -> bool {
     found.claims.as_ref().is_none_or(|claims| claims.place.probability >= MIN_PROBABLE)
+}
+
+/// Returns true if the law of a cause is less probable than its first alternative.
+pub(super) fn is_less_probable(found: &FoundEffect) -> bool {
+    let law = found.claims.as_ref().map_or(1.0, |claims| claims.law.probability);
+    found.alternatives.first().is_some_and(|rival| rival.probability > law)
 }
 
 /// States the claim about a cause whose law is unknown: its `place` with the probability `at`, and

@@ -16,8 +16,13 @@ use crate::quantity::format::{
 /// Header of the table of causes.
 const HEADER: [&str; 5] = ["cause", "probability", "change ± 1 σ", "error left out", "more poses"];
 
-/// Returns the verdict, with a figure of the evidence after each of the tested `rows`.
-pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> Story {
+/// Returns the verdict, with a figure of the evidence after each of the tested `rows`. `is_trusted`
+/// is true if the estimate is to be trusted.
+pub(crate) fn watch(
+    problem: &Problem,
+    (watch, is_trusted): (&Watch, bool),
+    rows: &Measurements,
+) -> Story {
     let unit = watch.unit.display(0.0);
     let in_unit = |error: f64| format!("{} {}", two_digits(error * unit.factor, 4), unit.symbol);
     let (chi2, coordinates, p) = watch.chi2;
@@ -36,7 +41,7 @@ pub(crate) fn watch(problem: &Problem, watch: &Watch, rows: &Measurements) -> St
             ""
         },
         in_unit(watch.error),
-        explanation(watch)
+        explanation(watch, is_trusted)
     );
     if let Some(left) = watch.unexplained_error() {
         let hidden = if watch.days > 0.0 {
@@ -87,10 +92,14 @@ fn days(days: f64) -> String {
     format!("{} {noun}", number(days, digits))
 }
 
-/// Says what explains the errors of rows without a change; empty if the arm has changed.
-fn explanation(watch: &Watch) -> String {
+/// Says what explains the errors of rows without a change; empty if the arm has changed. Without a
+/// trusted estimate nothing does.
+fn explanation(watch: &Watch, is_trusted: bool) -> String {
     let drift = format!("{} of drift", days(watch.days));
     match (watch.p_without_drift, watch.chi2.2) {
+        _ if !is_trusted => {
+            "; the estimate is not to be trusted, so neither is this verdict".to_owned()
+        }
         _ if watch.is_changed() => String::new(),
         (None, p) if p < MIN_EXPECTED_P => {
             ", more than noise and the known misfit explain".to_owned()

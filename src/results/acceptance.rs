@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::identification::FindingKeys;
 use super::remainder::BoundSummary;
 use super::summary::{nominal_arm, rows_in};
 use super::tables::commanded_joints;
-use crate::fit::{Acceptance, Accuracy, Identification, ToleranceTest};
+use crate::fit::{Acceptance, Accuracy, Finding, Identification, ToleranceTest};
 use crate::measurement::Measurements;
 use crate::numeric::range;
 use crate::problem::{HeldOut, Problem};
@@ -44,6 +45,9 @@ pub struct AcceptanceResult {
     pub strategy: &'static str,
     pub solver: &'static str,
     pub trusted: bool,
+    /// Findings of the checks of the fit.
+    #[schemars(with = "Vec<FindingKeys>")]
+    pub findings: Vec<Finding>,
     pub conditions: Vec<Condition>,
     pub identification_rows: usize,
     pub held_out_rows: usize,
@@ -193,6 +197,7 @@ impl AcceptanceResult {
             strategy: found.strategy.as_str(),
             solver: found.solver.as_str(),
             trusted: found.is_trusted(),
+            findings: found.findings.clone(),
             conditions: conditions(problem, rows, judged),
             identification_rows: rows_in(found, |errors| errors.identification),
             held_out_rows: found.fitted.held_out.n,

@@ -73,7 +73,8 @@ impl Knowledge {
     }
 }
 
-/// Returns true if the standard error is missing or too large for a calibration.
+/// Returns true if the standard error is missing or too large for a calibration: above 1°, 10 mm, or
+/// half of a stiffness or rigidity.
 fn is_vague(estimate: &Estimate) -> bool {
     let limit = match estimate.unit {
         Unit::Angle => 1.0_f64.to_radians(),

@@ -50,7 +50,7 @@ pub struct Detectable {
 /// which for a harmonic is its amplitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Size {
-    /// Names of the parameters, such as `joint-harmonic[3].sin1`.
+    /// Names of the parameters of the effect, such as `joint-harmonic[3].sin1`.
     pub parameters: Vec<String>,
     /// Unit of the effect's parameters.
     pub unit: Unit,

@@ -36,11 +36,11 @@ const MIN_VARIANCE_OF_POSE: f64 = 1e-3;
 /// Problem with its effects, fitted to the identification rows.
 #[derive(Clone)]
 pub(super) struct Fitted {
-    /// Problem with its effects declared.
+    /// Problem that was fitted, with the effects found so far declared in it.
     pub problem: Problem,
     /// Model of the problem.
     pub model: Model,
-    /// Result of the fit.
+    /// Identification of `problem` from the identification rows.
     pub found: Identification,
     /// Indices in the model of the fitted parameters that are not at a bound.
     pub unknowns: Vec<usize>,
@@ -53,7 +53,7 @@ pub(super) struct Fitted {
     pub set_aside: Vec<usize>,
     /// Linear neighbourhood at the identification rows, computed on first use.
     at_rows: OnceLock<Arc<LinearNeighbourhood>>,
-    /// Derivatives at the fit, cached if there are many unknowns.
+    /// Derivatives of the residuals at the end of the fit, cached if there are many unknowns.
     derivatives: Arc<Mutex<Option<Arc<Derivatives>>>>,
 }
 

@@ -15,9 +15,11 @@ const MAX_NONCENTRALITY: f64 = 1024.0;
 /// explains. Without an effect, the fraction follows Beta(k/2, (ν − k)/2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ScanTest {
-    /// Half the number of additional columns, k / 2.
+    /// First parameter k/2 of the beta distribution: half the number k of columns that the
+    /// candidate adds.
     new: f64,
-    /// Half the residual degrees of freedom, (ν − k) / 2.
+    /// Second parameter (ν − k)/2 of the beta distribution: half the residual degrees of freedom
+    /// with the candidate.
     left: f64,
     /// Smallest fraction of the sum of squares that the candidate must explain to be found.
     threshold: f64,

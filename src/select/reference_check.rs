@@ -41,7 +41,8 @@ pub enum ReferenceVerdict {
 /// Check of an effect against data that were not fitted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReferenceCheck {
-    /// Description of the data of the check.
+    /// Description of the data that were not fitted and judge the effect, such as the reference
+    /// readings.
     pub data: String,
     /// Outcome of the check.
     pub verdict: ReferenceVerdict,

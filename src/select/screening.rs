@@ -20,7 +20,8 @@ pub struct Ranked {
     pub effect: Effect,
     /// p-value of the F test, corrected for the candidates tried.
     pub p_value: f64,
-    /// F statistic and the degrees of freedom of its numerator.
+    /// F statistic of adding the effect, and the degrees of freedom of its numerator (the number of
+    /// new directions).
     pub f: (f64, usize),
     /// Expected reduction of the root mean squared error on the identification poses \[m\].
     pub gain: f64,
@@ -40,7 +41,7 @@ pub struct Ranked {
 pub struct Trace {
     /// Fit of the declared problem to the identification rows.
     pub fit: Identification,
-    /// Tests of the residual of that fit.
+    /// Tests of the residual of the fit `fit` for structure.
     pub residual_tests: ResidualTests,
     /// Candidates in order of an information criterion, best first; only the best of each family at
     /// each place.

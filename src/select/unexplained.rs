@@ -54,7 +54,7 @@ pub struct Correction {
 /// Correction as a function of one covariate, with partial residuals.
 #[derive(Debug, Clone)]
 pub struct Curve {
-    /// Covariate of the curve.
+    /// Quantity on which the correction depends, the abscissa of the curve.
     pub covariate: Covariate,
     /// Unit of the corrected coordinate: an angle or a length.
     pub unit: Unit,
@@ -69,7 +69,7 @@ pub struct Curve {
 /// corrected fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartialResidual {
-    /// Value of the covariate, in its unit.
+    /// Value of the covariate of this pose, SI; temperatures in °C.
     pub covariate: f64,
     /// Value at the pose of the correction that the fit found for the coordinate \[rad\] or \[m\].
     pub correction: f64,
@@ -200,7 +200,8 @@ fn correction(
 }
 
 /// Returns a correction as a function of one covariate, from its part of the residual (`function`)
-/// and the remaining residual (`remaining`), both in units of σ. `None` if it is no such function.
+/// and the remaining residual (`remaining`), both in units of σ. `None` if the hypothesis
+/// depends on more than one covariate.
 fn curve(
     hypotheses: &Hypotheses,
     hypothesis: &Hypothesis,

@@ -184,6 +184,7 @@ fn a_choice_ends_when_it_is_interrupted() {
             explanations: None,
             remainder: false,
             fit,
+            update: None,
         };
         design::next(&problem, &data, &candidates, &options).map(|next| next.poses.len())
     };

@@ -56,10 +56,13 @@ fn a_scale_within_the_priors_is_contradicted_from_one_percent_on() {
     }
 }
 
+/// Change of the joint angles of one row.
+type JointMistake = fn(&mut [f64]);
+
 #[test]
 fn units_and_orders_of_joint_columns_are_named() {
     let (problem, clean) = arm();
-    let mistakes: [(fn(&mut [f64]), &str); 3] = [
+    let mistakes: [(JointMistake, &str); 3] = [
         (
             |q| q.iter_mut().for_each(|angle| *angle *= 4096.0 / 360.0),
             "joint angles that are counts of 4096 to a turn",

@@ -16,7 +16,7 @@ use crate::error::{binary_format, one_line};
 use crate::files::{Changes, changed_key, read_limited};
 use crate::fit::checks::pose_sufficiency::label;
 use crate::fit::{Placement, Strategy};
-use crate::measurement::{Measurements, StartTimes, is_date};
+use crate::measurement::{Measurements, StartTimes};
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
@@ -291,15 +291,6 @@ impl SavedEstimate {
     pub fn measurement_scale(&self) -> Option<f64> {
         let is_scale = |entry: &&Entry| entry.name.starts_with("tracker-scale");
         self.parameters.iter().find(is_scale).map(|entry| entry.estimate)
-    }
-
-    /// Returns the days from the first pose of the identification to the first of these rows; `None`
-    /// unless both have dates.
-    #[doc(hidden)]
-    pub fn days_until(&self, rows: &Measurements) -> Option<f64> {
-        let first = self.start_times.as_ref()?.first;
-        let later = rows.start_times().first - first;
-        (rows.has_dates() && is_date(first)).then_some(later / 86_400.0)
     }
 
     /// Sets the elapsed times of `poses` to those since the start of their session in the

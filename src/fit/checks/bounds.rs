@@ -34,11 +34,10 @@ impl Check for BoundsAreSeen {
             let more = names.len().saturating_sub(MAX_NAMED_PARTNERS);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
             let first = names[..names.len().min(MAX_NAMED_PARTNERS)].join(", ");
-            let follow =
-                if names.len() == 1 { "follows it, and has" } else { "follow it, and have" };
             let text = format!(
-                "{name} rests on its {side} bound along a direction that the data hardly see; \
-                 {first}{more} {follow} standard errors that allow for that"
+                "{name} rests on its {side} bound; the data hardly determine more than one \
+                 combination of it with {first}{more}, whose standard errors include what {name} \
+                 may do within its bounds"
             );
             let numbers = [json!(name), side.into(), (*deviation).into(), json!(names)];
             Finding::new(FindingCode::BoundInUnidentifiedDirection, numbers, text)

@@ -25,8 +25,9 @@ const MIN_NOISE_FACTOR: f64 = 4.0;
 const MIN_EXPLAINED: f64 = 0.8;
 /// Largest probability of a reported change by chance (F test), times the number of tries.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-6;
-/// Smallest ratio of the residual that a change leaves in another order of the rows, or that a
-/// drift over the rows leaves, to that in the order of the table.
+/// Smallest factor by which the best change in any other order of the rows, or a drift over the
+/// rows, must leave more cost than the change in the order of the table, for that change to be
+/// reported.
 const MIN_OTHER_RATIO: f64 = 2.0;
 /// Largest number of rows and of unknowns for which the order is examined. The time of an order
 /// grows with the product of the number of rows and the square of the number of unknowns, and, for

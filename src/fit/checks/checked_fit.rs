@@ -149,15 +149,38 @@ impl CheckedFit<'_> {
         problem: &Problem,
         result: impl FnOnce(&Fitting) -> R,
     ) -> Option<R> {
+        self.with_strategy(self.fitting.strategy.without_sweeps(), problem, result)
+    }
+
+    /// Returns the rms residual of the rows of `kind` with strategy joint; `None` if that is the
+    /// strategy of the fit.
+    pub fn joint_rms(&self, kind: &RowKind) -> Option<f64> {
+        let is_joint = self.fitting.strategy == Strategy::Joint;
+        let refit = || {
+            self.with_strategy(Strategy::Joint, self.problem, |fitting| {
+                let end = fitting.run(&fitting.registered().ok()?).ok()?;
+                Some(self.rms(&kind.rows, &fitting.position_errors(&kind.rows, &end.x)))
+            })
+        };
+        if is_joint { None } else { refit()? }
+    }
+
+    /// Does the work of [`with_problem`](Self::with_problem) with another strategy.
+    fn with_strategy<R>(
+        &self,
+        strategy: Strategy,
+        problem: &Problem,
+        result: impl FnOnce(&Fitting) -> R,
+    ) -> Option<R> {
         let Fitting { placement, measurements, split, .. } = *self.fitting;
         let declared = Model::new(problem, &placement.bases, &placement.targets).ok()?;
-        let model = &self.fitting.strategy.model(declared);
+        let model = &strategy.model(declared);
         // The other model needs a cache of its own, because its linearisations differ.
         let cache = &LinearisationCache::default();
         Some(result(&Fitting {
             model,
             held_out_only: placement.held_out_only(model, measurements, split),
-            strategy: self.fitting.strategy.without_sweeps(),
+            strategy,
             solver: SolverChoice::Auto.decide(model),
             custom_solver: None,
             progress: None,

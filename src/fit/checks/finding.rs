@@ -281,10 +281,12 @@ impl Finding {
                 "declare a larger σ if the instrument is less accurate"
             }
             FindingCode::RowsSetAside => "check these rows",
-            FindingCode::HeldOutOutliers => "look for mistyped numbers and signs there",
+            FindingCode::HeldOutOutliers => {
+                "numbers or signs are mistyped there, or what the loop found is not the right cause"
+            }
             _ => return,
         };
-        self.remedy = format!("flexcal loop does not remove this, so {remedy}");
+        self.remedy = format!("flexcal loop does not remove this: {remedy}");
     }
 
     /// Returns the severity of the finding, which its code determines.

@@ -10,6 +10,7 @@ use super::finding::{Finding, FindingCode};
 use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD};
 use super::outliers::{Outlier, outliers_as_json};
 use super::row_kind::{RowKind, format_error, row_noun};
+use crate::fit::Identification;
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::residual_lengths::{noise_lengths_of_all, scatter};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
@@ -258,29 +259,57 @@ pub(super) struct WithoutOutliers;
 impl Check for WithoutOutliers {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let (rows, of) = (fit.held_out_outliers, fit.fitting.split.held_out.len());
-        if rows.is_empty() {
-            return Vec::new();
-        }
-        let name = |row: &Outlier| {
-            let is_vector = kind_named(row.kind).numbers == 3;
-            let axis = if is_vector { " along an axis" } else { "" };
-            format!(
-                "{} (off by {}{axis})",
-                row.location,
-                format_error(row.kind, row.error.amax(), 3)
-            )
+        if rows.is_empty() { Vec::new() } else { vec![finding_of(rows, of)] }
+    }
+}
+
+/// Returns the finding about held-out outliers `rows` among `of` held-out rows.
+fn finding_of(rows: &[Outlier], of: usize) -> Finding {
+    let name = |row: &Outlier| {
+        let is_vector = kind_named(row.kind).numbers == 3;
+        let axis = if is_vector { " along an axis" } else { "" };
+        format!("{} (off by {}{axis})", row.location, format_error(row.kind, row.error.amax(), 3))
+    };
+    let are_positions = rows.iter().all(|row| row.kind == "position");
+    let noun = if are_positions { "poses" } else { "rows" };
+    let named: Vec<String> = rows.iter().take(MAX_NAMED_ROWS).map(name).collect();
+    let more = rows.len().saturating_sub(MAX_NAMED_ROWS);
+    let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+    let (count, verb) = (rows.len(), if rows.len() == 1 { "is" } else { "are" });
+    let text = format!(
+        "{count} of {of} held-out {noun} {verb} too far off to be noise: {}{more}",
+        named.join(", ")
+    );
+    Finding::new(FindingCode::HeldOutOutliers, [outliers_as_json(rows), of.into()], text)
+}
+
+impl Identification {
+    /// Judges the held-out rows with a remainder that is kept: rows that it brings near their
+    /// prediction are no outliers. `errors` are those of all rows with the remainder \[m\].
+    pub(crate) fn judge_corrected(&mut self, errors: &[Vector3<f64>]) {
+        let of = self.fitted.held_out.n;
+        let limit = noise_lengths_of_all(&vec![3; of]).first().map_or(0.0, |lengths| lengths.1);
+        let corrected = |row: &Outlier| {
+            let error = errors.get(row.row).copied().unwrap_or(row.error);
+            let distance = row.distance * error.norm() / row.error.norm();
+            (row.kind != "position" || distance > limit).then(|| Outlier {
+                distance,
+                error,
+                ..row.clone()
+            })
         };
-        let are_positions = rows.iter().all(|row| row.kind == "position");
-        let noun = if are_positions { "poses" } else { "rows" };
-        let named: Vec<String> = rows.iter().take(MAX_NAMED_ROWS).map(name).collect();
-        let more = rows.len().saturating_sub(MAX_NAMED_ROWS);
-        let more = if more > 0 { format!(", and {more} more") } else { String::new() };
-        let (count, verb) = (rows.len(), if rows.len() == 1 { "is" } else { "are" });
-        let text = format!(
-            "{count} of {of} held-out {noun} {verb} too far off to be noise: {}{more}",
-            named.join(", ")
-        );
-        let numbers = [outliers_as_json(rows), of.into()];
-        vec![Finding::new(FindingCode::HeldOutOutliers, numbers, text)]
+        self.held_out_outliers = self.held_out_outliers.iter().filter_map(corrected).collect();
+        let rows = &self.held_out_outliers;
+        self.findings.retain(|of| of.code != FindingCode::HeldOutOutliers || !rows.is_empty());
+        for finding in &mut self.findings {
+            match finding.code {
+                FindingCode::HeldOutOutliers => {
+                    let Finding { numbers, text, .. } = finding_of(rows, of);
+                    (finding.numbers, finding.text) = (numbers, text);
+                }
+                FindingCode::HeldOutBeyondPrediction => finding.text += ", without the remainder",
+                _ => {}
+            }
+        }
     }
 }

@@ -121,8 +121,9 @@ const CONSEQUENCES: [FindingCode; 8] = [
     FindingCode::HeldOutOutliers,
 ];
 
-/// Codes of findings that elasticity causes if a rigid arm is fitted.
-const OF_RIGID_ARM: [FindingCode; 6] = [
+/// Codes of findings that a strategy causes which leaves out the elasticity, or stops before all
+/// parameters agree.
+const OF_STRATEGY: [FindingCode; 6] = [
     FindingCode::NoiseBeyondDeclared,
     FindingCode::ResidualBeyondDeclared,
     FindingCode::HeldOutBeyondPrediction,
@@ -188,13 +189,18 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         for finding in findings.iter_mut().filter(is_consequence) {
             *finding = finding.clone().with_remedy(remedy.clone());
         }
-    } else if cause_text.is_none() && fit.ignores_elasticity() {
-        for finding in findings.iter_mut().filter(|found| OF_RIGID_ARM.contains(&found.code)) {
-            *finding = finding.clone().with_remedy(
-                "strategy rigid ignores the elasticity that the problem declares, so fit with \
-                 strategy joint"
-                    .to_owned(),
-            );
+    } else if cause_text.is_none() {
+        let remedy = if fit.ignores_elasticity() {
+            "strategy rigid ignores the elasticity that the problem declares, so fit with \
+             strategy joint"
+        } else if findings.iter().any(|found| found.remedy == misread::FIT_JOINTLY) {
+            misread::FIT_JOINTLY
+        } else {
+            ""
+        };
+        let is_of_strategy = |found: &&mut Finding| OF_STRATEGY.contains(&found.code);
+        for finding in findings.iter_mut().filter(is_of_strategy).filter(|_| !remedy.is_empty()) {
+            *finding = finding.clone().with_remedy(remedy.to_owned());
         }
     }
     state_held_out_remedies(&mut findings);

@@ -55,8 +55,8 @@ const MIN_SHARE: f64 = 0.25;
 /// It is that of the deviation which parameters that act alike share. `None` as for
 /// [`prior_sigmas`].
 fn expected_sigmas(fit: &CheckedFit, parameter: &Parameter, x: f64) -> Option<f64> {
-    let is_of = |k: &usize| std::ptr::eq(&fit.fitting.model.parameters[*k], parameter);
-    let place = fit.whole.unknowns.iter().position(|k| is_of(k));
+    let is_of = |k: &usize| std::ptr::eq(&raw const fit.fitting.model.parameters[*k], parameter);
+    let place = fit.whole.unknowns.iter().position(is_of);
     let share = place.and_then(|place| fit.statistics.identified.get(place)).copied();
     let share = share.filter(|share| *share >= MIN_SHARE).unwrap_or(1.0);
     Some(prior_sigmas(parameter, x)? / share.sqrt())

@@ -82,7 +82,7 @@ struct PlaceSums {
     crossed: DMatrix<f64>,
     /// Dᵀr.
     right: DVector<f64>,
-    /// True if a row was added since the last comparison.
+    /// True if a row was added since the cost of a change of this place was last computed.
     is_new: bool,
 }
 

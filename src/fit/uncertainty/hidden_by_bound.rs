@@ -24,8 +24,8 @@ const MIN_HIDDEN_RATIO: f64 = 3.0;
 /// Factor on the rows that hold combinations constant, so large that data and priors hardly change
 /// these combinations.
 const CONSTRAINT_WEIGHT: f64 = 1e5;
-/// Largest value of μ u + ½ h u² up to which the posterior of u is integrated; beyond it, the
-/// density is negligible.
+/// Largest −ln of the posterior density of the distance u from the bound (μ u + ½ h u², see the
+/// module) up to which it is integrated; beyond it, the density is negligible.
 const MAX_EXPONENT: f64 = 40.0;
 /// Number of intervals of the quadrature over u; even, for Simpson's rule.
 const QUADRATURE_INTERVALS: u32 = 400;

@@ -141,7 +141,7 @@ impl Dimension {
         }
     }
 
-    /// Returns the unit in words.
+    /// Returns the unit as symbols, such as `m·kg^2`; `a number` if there is none.
     pub(super) fn symbol(self) -> String {
         let part = |(power, symbol): (&i32, &&str)| match power {
             0 => None,

@@ -22,7 +22,7 @@ pub struct Bounds {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BoundsError {
-    /// The two vectors differ in length.
+    /// The vectors of lower and of upper bounds differ in length.
     #[error("setting bounds: {lower} lower bounds, but {upper} upper bounds")]
     Sizes {
         /// Number of lower bounds.
@@ -34,7 +34,7 @@ pub enum BoundsError {
     /// side.
     #[error("setting bounds: unknown {index} has no value between {lower} and {upper}")]
     Empty {
-        /// Index of the unknown.
+        /// Index of the unknown whose bounds are wrong, from 0.
         index: usize,
         /// Lower bound of the unknown.
         lower: f64,

@@ -66,7 +66,8 @@ impl Factor {
 
     /// Returns the minimiser of ‖B q + c‖² + λ‖q‖², the shortest one for λ = 0.
     ///
-    /// q(λ) = −Σ σᵢ/(σᵢ² + λ) (uᵢᵀc) vᵢ
+    /// q(λ) = −Σ σᵢ/(σᵢ² + λ) (uᵢᵀc) vᵢ, a vector of length n, with B = Σ σᵢ uᵢ vᵢᵀ of n columns
+    /// [Golub & Van Loan 2013, §6.1.4]
     pub fn damped(&mut self, lambda: f64) -> DVector<f64> {
         let n = self.matrix.ncols();
         self.spectrum().solution(lambda, n)

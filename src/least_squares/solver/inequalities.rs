@@ -25,7 +25,7 @@ pub enum InequalitiesError {
     /// Matrix and limits differ in their number of rows.
     #[error("setting inequalities: {rows} rows, but {lower} lower and {upper} upper limits")]
     Sizes {
-        /// Rows of the matrix.
+        /// Number of rows of the matrix of the inequalities.
         rows: usize,
         /// Number of lower limits.
         lower: usize,
@@ -35,11 +35,11 @@ pub enum InequalitiesError {
     /// A row violates lo ≤ hi, has a coefficient that is not finite, or only zeros.
     #[error("setting inequalities: row {row} cannot hold between {lower} and {upper}")]
     Empty {
-        /// Index of the row.
+        /// Index of the inequality whose limits are wrong, from 0.
         row: usize,
-        /// Lower limit of the row.
+        /// Lower limit of this inequality.
         lower: f64,
-        /// Upper limit of the row.
+        /// Upper limit of this inequality.
         upper: f64,
     },
 }

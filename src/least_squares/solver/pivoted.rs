@@ -19,16 +19,17 @@ const MIN_UNPIVOTED_RATIO: f64 = 1e-8;
 /// A well-conditioned upper triangle B is used as the factor directly.
 #[derive(Debug, Clone)]
 pub(super) struct Pivoted {
-    /// Triangular factor R of B S⁻¹ P.
+    /// Triangular factor R of B S⁻¹ P: the matrix B with unit columns, permuted by P, shape = (n,
+    /// n).
     triangle: DMatrix<f64>,
-    /// Projection `Qᵀc` of the constant.
+    /// Projection `Qᵀc` of the constant c of the problem min ‖B q + c‖, length n.
     projected: DVector<f64>,
-    /// Inverse column norms 1/S in pivot order.
+    /// Inverse norms 1/S of the columns of B, in pivot order.
     inverse_norms: DVector<f64>,
     permutation: PermutationSequence<Dyn>,
-    /// Solution q at λ = 0, in pivot order.
+    /// Minimiser q of ‖B q + c‖ without damping, in pivot order.
     solution: DVector<f64>,
-    /// True if B itself is the factor.
+    /// True if the matrix B is upper triangular and serves as the factor without pivoting.
     pub(super) is_unpivoted: bool,
 }
 

@@ -16,20 +16,20 @@ const MAX_HALF_SPACE_ROUNDING: f64 = 1e-14;
 pub(super) struct Polyhedron {
     pub(super) lower: DVector<f64>,
     pub(super) upper: DVector<f64>,
-    /// Normals G, shape = (k, n).
+    /// Unit normals of the half-spaces G q ≥ h as rows, shape = (k, n).
     pub(super) normals: DMatrix<f64>,
-    /// Offsets h of the half-spaces.
+    /// Offsets h of the half-spaces G q ≥ h, length k.
     pub(super) offsets: DVector<f64>,
-    /// Faces that contain q = 0, that is x itself.
+    /// Faces that contain the zero step q = 0, that is the present point x itself.
     pub(super) faces_at_origin: Faces,
 }
 
 /// Set of faces of the polyhedron.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Faces {
-    /// Active bound of each unknown, if any.
+    /// Bound on which a step rests in each unknown; `None` if it rests on none.
     pub(super) bounds: Vec<Option<AtBound>>,
-    /// True for each active half-space.
+    /// For each half-space G q ≥ h, true if the step rests on it.
     pub(super) rows: Vec<bool>,
 }
 

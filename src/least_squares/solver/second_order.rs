@@ -28,7 +28,7 @@ const MIN_SLOW_STEPS: usize = 3;
 const MIN_STEPS_PER_UNKNOWN_BETWEEN_FORMATIONS: f64 = 1.0 / 40.0;
 /// Ratio of the lengths of successive undamped steps above which convergence is slow.
 const MIN_SLOW_RATIO: f64 = 0.5;
-/// Maximum number of times that S is formed in one run.
+/// Maximum number of times that the second-order term S = Σ rᵢ ∇²rᵢ is formed in one run.
 const MAX_FORMATIONS: usize = 50;
 /// Penalty ρ on leaving active faces in the convex model, relative to the largest curvature.
 const FACE_PENALTY: f64 = 1e3;
@@ -53,13 +53,13 @@ pub(super) struct SecondOrder {
     is_straight: bool,
     /// Lengths ‖D p‖ of the last successive undamped steps.
     lengths: Vec<f64>,
-    /// Matrix S, if it was formed.
+    /// Second-order term S = Σ rᵢ ∇²rᵢ of the Hessian, shape = (n, n); `None` until it is formed.
     matrix: Option<DMatrix<f64>>,
-    /// True if S was formed at the present point.
+    /// True if the second-order term S was formed at the present point, not at an earlier one.
     is_fresh: bool,
-    /// Number of steps since S was formed.
+    /// Number of steps since the second-order term S was last formed.
     age: usize,
-    /// Number of times that S was formed.
+    /// Number of times that the second-order term S was formed in this run.
     formations: usize,
     /// True once convergence was reached and second derivatives are no longer used.
     is_retired: bool,
@@ -71,7 +71,8 @@ pub(super) struct SecondOrder {
 pub(super) struct ConvexModel {
     /// Model in the form of linearised residuals: gradient Rᵀ(Qᵀr), Hessian RᵀR.
     pub linearisation: Linearisation,
-    /// Damping μ ≥ 0 of the scaled step q = D p.
+    /// Damping μ ≥ 0 that was added to the Hessian to make the model convex, in terms of the scaled
+    /// step q = D p.
     damping: f64,
     /// Penalty rows √ρ N, with the unit normals N of active faces, shape = (faces, n).
     penalty_rows: DMatrix<f64>,

@@ -8,9 +8,9 @@ use crate::least_squares::Objective;
 /// Solution with the reason of termination and the number of evaluations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// Best point x evaluated.
+    /// Values of the unknowns with the smallest cost that was found, length n.
     pub x: DVector<f64>,
-    /// Cost ½‖r(x)‖² at x.
+    /// Cost ½‖r(x)‖² at the point `x`.
     pub cost: f64,
     /// Reason for which the solver stopped.
     pub termination: Termination,
@@ -20,9 +20,9 @@ pub struct Solution {
     pub cost_evaluations: u64,
     /// Number of evaluations of residuals and derivatives.
     pub linearisations: u64,
-    /// Active bound of each unknown, if any.
+    /// Bound at which each unknown ends; `None` for an unknown between its bounds.
     pub at_bound: Vec<Option<AtBound>>,
-    /// Active limit of each inequality, if any.
+    /// Limit at which each inequality ends; `None` for an inequality between its limits.
     pub at_limit: Vec<Option<AtBound>>,
 }
 

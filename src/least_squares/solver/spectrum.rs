@@ -17,11 +17,11 @@ pub(super) struct Spectrum {
 /// Term of the expansion that belongs to one singular value.
 #[derive(Debug, Clone)]
 struct SpectralTerm {
-    /// Singular value σᵢ of B.
+    /// Singular value σᵢ of the matrix B of the problem min ‖B q + c‖.
     singular: f64,
-    /// Projection `−uᵢᵀc` of the constant.
+    /// Projection `−uᵢᵀc` of the constant c on the left singular vector uᵢ.
     projected: f64,
-    /// Right singular vector vᵢ.
+    /// Right singular vector vᵢ of the matrix B, length n.
     direction: DVector<f64>,
 }
 

@@ -7,11 +7,12 @@ use nalgebra::DVector;
 pub struct Step {
     /// Point x + p that the step reaches.
     pub point: DVector<f64>,
-    /// Scaled length ‖D p‖.
+    /// Length ‖D p‖ of the step p, scaled by the diagonal matrix D.
     pub length: f64,
-    /// First-order reduction −gᵀp of ½‖r‖².
+    /// First-order reduction −gᵀp of the cost ½‖r‖² by the step p, with the gradient g.
     pub slope: f64,
-    /// Predicted reduction ½‖r‖² − ½‖J p + r‖².
+    /// Reduction ½‖r‖² − ½‖J p + r‖² of the cost by the step p that the linearised residuals
+    /// predict.
     pub predicted: f64,
     /// Damping λ, zero if the radius did not limit the step.
     pub damping: f64,

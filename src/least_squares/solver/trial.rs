@@ -6,7 +6,8 @@ use super::Step;
 /// step, the radius is multiplied by this ratio over the actual one, at least by 1.5 and at most by
 /// 8.
 const TARGET_ACCELERATION: f64 = 0.03;
-/// Smallest gain ratio ρ at which the radius grows.
+/// Smallest gain ratio ρ (actual over predicted reduction of the cost) at which the trust-region
+/// radius grows.
 pub(super) const MIN_GROWTH_RATIO: f64 = 0.75;
 
 /// Tried step with its actual and predicted reductions, relative to the previous cost.
@@ -18,7 +19,7 @@ pub(super) struct Trial {
     pub ratio: f64,
     pub length: f64,
     pub damping: f64,
-    /// Factor by which the radius grows after the step.
+    /// Factor on the trust-region radius after the step.
     pub radius_growth: f64,
 }
 

@@ -12,7 +12,7 @@ use super::trial::{MIN_GROWTH_RATIO, Trial};
 use super::{Settings, Termination};
 use crate::least_squares::{Linearisation, Objective};
 
-/// Smallest gain ratio ρ at which a step is accepted.
+/// Smallest gain ratio ρ (actual over predicted reduction of the cost) at which a step is accepted.
 const MIN_ACCEPTED_RATIO: f64 = 1e-4;
 /// Largest ratio of geodesic acceleration to step length at which an accelerated step is used.
 const MAX_ACCELERATION_RATIO: f64 = 0.75;
@@ -114,10 +114,11 @@ pub struct TrustRegion<S> {
     settings: Settings,
     scale: DVector<f64>,
     radius: Option<f64>,
-    /// True once D was set from plausible sizes.
+    /// True once the scaling D was set from the plausible sizes of the unknowns; it then no longer
+    /// follows the columns of the Jacobian.
     is_scale_fixed: bool,
     second_order: SecondOrder,
-    /// Linearised problem at x.
+    /// Residuals linearised at the present point x; `None` before the first evaluation.
     linearisation: Option<Linearisation>,
     /// Model with second derivatives that replaces the linearised problem, if S is in use.
     convex: Option<ConvexModel>,

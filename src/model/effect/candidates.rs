@@ -261,9 +261,9 @@ impl Effect {
             Need::Play if data.approach => {
                 unless(both_sides, "the joint was not approached from both sides")
             }
-            Need::Play if self.joint().is_some_and(|joint| slides(problem, joint)) => {
-                Some("no directions of approach, and moments move nothing along a slide")
-            }
+            Need::Play if self.joint().is_some_and(|joint| slides(problem, joint)) => Some(
+                "no columns approach1 …, and a sliding joint has no moment of the loads that tells the side",
+            ),
             Need::Loads | Need::Play => unless(data.has_gravity(), NO_LOADS),
             Need::Covariate => {
                 let name = self.covariate();

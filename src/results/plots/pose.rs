@@ -24,7 +24,7 @@ pub struct PoseError {
     /// Residual measured − predicted of the registered nominal arm, in the same frame and unit as
     /// `error`.
     pub before: Vector3<f64>,
-    /// Standard deviation (1 σ) of each measured coordinate \[m\].
+    /// Standard deviation (1 σ) of each measured coordinate, in the unit of `error`.
     pub sigma: f64,
     /// Time of the row \[s\], or its number, counted from 1, if no time was measured.
     pub time: f64,

@@ -24,11 +24,13 @@ pub(super) struct ColumnProducts(Vec<OnceLock<Member>>);
 
 /// Hypothesis that is a member of at least one set, with its cached products.
 pub(super) struct Member {
-    /// Columns A with the fitted parameters projected out.
+    /// Whitened columns A of the hypothesis with the fitted parameters projected out, shape = (3 N,
+    /// k).
     pub columns: Arc<DMatrix<f64>>,
-    /// Transpose Aᵀ.
+    /// Transpose of `columns`, shape = (k, 3 N).
     pub transposed: DMatrix<f64>,
-    /// Products AᵀC with the columns of every hypothesis.
+    /// Products AᵀC of `columns` with the columns C of every hypothesis, each computed on first
+    /// use.
     products: Vec<OnceLock<DMatrix<f64>>>,
 }
 

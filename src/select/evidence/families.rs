@@ -13,7 +13,7 @@ pub(super) struct Families(Vec<Family>);
 struct Family {
     name: String,
     weight: f64,
-    /// Sum of the shares of its members.
+    /// Sum of the shares of the prior probability that the members of the family have.
     shares: f64,
     is_of_functions: bool,
 }

@@ -20,7 +20,7 @@ pub enum Site {
     Base,
     /// Payload at the tool.
     Payload,
-    /// Tool.
+    /// Tool or its target.
     Tool,
     /// Hoist that carries part of the weight.
     Hoist,

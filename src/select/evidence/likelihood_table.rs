@@ -14,9 +14,9 @@ pub(super) type Jet = [f64; 3];
 /// order of use.
 #[derive(Debug, Clone)]
 pub(super) struct LikelihoodTable {
-    /// Smallest tabulated ln S.
+    /// Value of ln S, the logarithm of the sum of squares, at the first node of the table.
     first: f64,
-    /// Distance between two nodes in ln S.
+    /// Difference of ln S, the logarithm of the sum of squares, between successive nodes.
     step: f64,
     /// Value at each node with its derivatives by ln S, each derivative times as many powers of the
     /// step.

@@ -22,7 +22,7 @@ use crate::numeric::lower_factor;
 /// of the grid is [`MAX_LN_NOISE_STEP`], or half the width 1/√(2ν) of the likelihood with ν degrees
 /// of freedom if that is less.
 const MAX_LN_NOISE_FACTOR: f64 = 3.5;
-/// Largest step of ln f on the grid.
+/// Largest step of the grid over ln f, the logarithm of the noise factor f = true σ / assumed σ.
 const MAX_LN_NOISE_STEP: f64 = 0.05;
 /// Smallest step of ln f on the grid, which limits the grid's size. No data set has so many degrees
 /// of freedom that it needs a smaller step.
@@ -46,7 +46,7 @@ const GRAM_ROWS: usize = 48;
 pub(super) struct Noise {
     /// Degrees of freedom ν of the residual.
     pub freedom: f64,
-    /// Half-width of the Cauchy prior on ln f.
+    /// Half-width of the Cauchy prior on ln f, where f = true σ / assumed σ is the noise factor.
     pub ln_half_width: f64,
     /// Smallest ln f considered. It is 0 for a declared σ, because a smaller noise would make
     /// effects significant that an instrument with that σ cannot show.
@@ -80,13 +80,15 @@ impl Noise {
 /// Grid over the noise factor f, in ascending order.
 #[derive(Debug, Clone)]
 pub(super) struct NoiseGrid {
-    /// For each f, ln(prior(f) f^−ν) and 1 / (2 f²).
+    /// For each noise factor f of the grid: ln(prior(f) f^−ν) and 1/(2 f²), with the degrees of
+    /// freedom ν.
     terms: Vec<(f64, f64)>,
     /// Degrees of freedom ν of the residual.
     freedom: f64,
     /// Difference between the largest and the smallest ln prior(f) on the grid.
     prior_range: f64,
-    /// Tabulated likelihood.
+    /// Table of the ln likelihood, integrated over the noise factor, by the sum of squares of the
+    /// residual.
     table: LikelihoodTable,
 }
 
@@ -140,7 +142,7 @@ pub(super) fn ln_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
 /// Products of columns A with themselves and with the residual r: G = AᵀA and b = Aᵀr.
 #[derive(Debug, Clone)]
 pub(super) enum Normal {
-    /// Full matrix G, shape = (k, k), and b.
+    /// Full matrix G = AᵀA, shape = (k, k), and vector b = Aᵀr, length k.
     Dense { gram: DMatrix<f64>, product: DVector<f64> },
     /// Matrix G = D − LᵀL with D diagonal and L with few rows, shape = (few, k), and b. Arises for
     /// one column per pose after projection.

@@ -41,7 +41,7 @@ pub(super) struct Products<'a> {
     pub residual_model: &'a ResidualModel,
     /// Sum of squares rᵀr, with the fitted parameters projected out.
     pub squares: f64,
-    /// Grid of noise factors.
+    /// Grid over the noise factor f = true σ / assumed σ.
     grid: NoiseGrid,
     cache: CachedProducts,
 }
@@ -50,7 +50,7 @@ pub(super) struct Products<'a> {
 /// when hypotheses are appended to the list.
 #[derive(Default)]
 pub(super) struct CachedProducts {
-    /// Columns of members and their products.
+    /// Columns of each hypothesis that is in a set, with their products with other columns.
     columns: ColumnProducts,
     /// Gains of hypotheses when added to a set, by set.
     gains: Mutex<BTreeMap<SizedSet, Gains>>,
@@ -226,17 +226,18 @@ pub(super) struct ReducedProblem<'p, 'a> {
     products: &'p Products<'a>,
     members: Vec<usize>,
     sizes: Vec<f64>,
-    /// Index of the first column of each member among all columns.
+    /// Index of the first column of each member among the columns of all members of the set.
     begins: Vec<usize>,
-    /// Matrix L⁻¹D.
+    /// Matrix L⁻¹D: the sizes D of the members, divided by the Cholesky factor L of 1 + D AᵀA D.
     within: DMatrix<f64>,
-    /// Vector Z r.
+    /// Vector Z r = L⁻¹D Aᵀr: the residual r along the whitened columns of the set.
     residual_along: DVector<f64>,
     pub squares: f64,
     /// ln of the density of the residual that remains after the set is fitted, without the term in
     /// det L.
     without: f64,
-    /// Logarithm of the determinant of the Cholesky factor L.
+    /// ln det L of the Cholesky factor L of 1 + D AᵀA D, with the columns A and the sizes D of the
+    /// members.
     ln_determinant: f64,
     /// Matrix Z, computed when columns of other hypotheses are first needed.
     reach: OnceLock<DMatrix<f64>>,

@@ -11,7 +11,7 @@ use super::terms::{Chunk, Product, Sum, Terms, is_separated, ln_prior};
 use crate::numeric::kernel::few_transposed_times;
 use crate::numeric::parallel;
 
-/// Maximum number of terms of a sum.
+/// Maximum number of terms of a candidate law, each a coefficient times a product of factors.
 const MAX_TERMS: usize = 3;
 /// Number of best sums of each length that are extended by one more term.
 const EXTENDED_SUMS: usize = 8;
@@ -41,14 +41,15 @@ const MIN_BEAM_DIFFERENCE: f64 = 0.7;
 /// Scores of a sum.
 #[derive(Debug, Clone, Copy)]
 pub struct Scored {
-    /// ln of the posterior: evidence times prior.
+    /// ln of the posterior of the sum of terms, evidence times prior probability.
     pub ln_posterior: f64,
     /// ln of the posterior, computed as if the part of the explainable residual that the sum leaves
     /// were noise of unknown scale. By this score, simple terms are added first.
     guide: f64,
 }
 
-/// Sum that is extended, with the span of its columns.
+/// Candidate law (sum of terms) that the beam search extends, with an orthonormal basis of its
+/// columns.
 struct SpannedSum {
     sum: Sum,
     ln_prior: f64,
@@ -66,12 +67,12 @@ struct Extension {
 
 /// Beam search for the formula of an error at one site.
 pub struct Beam<'a> {
-    /// Terms from which sums are built.
+    /// Terms (products of functions of the pose) from which candidate laws are built.
     terms: Terms,
     quantities: &'a Quantities,
     /// Products of columns at the site's coordinate, with the fit projected out.
     site: &'a WhitenedSite,
-    /// Likelihood of a residual, integrated over the noise scale.
+    /// Table of ln p(residual) by its sum of squares, integrated over the noise scale.
     noise: &'a Noise,
     /// Sum of squares that one free value per pose would explain.
     explainable: f64,

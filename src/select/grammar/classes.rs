@@ -16,7 +16,8 @@ use crate::problem::{Effect, Joint, Problem};
 
 /// Largest ln odds of the best sum over another sum that is kept.
 const MAX_LN_ODDS: f64 = 12.0;
-/// Maximum number of sums that are grouped into classes.
+/// Maximum number of candidate laws (sums of terms) that are grouped into classes of nearly equal
+/// predictions.
 const MAX_SUMS: usize = 400;
 /// Maximum number of sums whose inner parameters are refined.
 const MAX_REFINED: usize = 40;
@@ -55,11 +56,11 @@ pub struct Proposal {
 }
 
 struct Class {
-    /// Sum that represents the class.
+    /// Candidate law (sum of terms) that represents the class.
     first: Refined,
-    /// Other sums of the class.
+    /// Other candidate laws of the class, which predict nearly the same as `first`.
     others: Vec<Refined>,
-    /// ln of the summed posteriors of the class.
+    /// ln of the sum of the posteriors of all candidate laws of the class.
     ln_posterior: f64,
 }
 

@@ -27,13 +27,13 @@ pub enum Form {
     Square(usize),
     /// Kink |q − c| in the command of a joint at an inner parameter c.
     Kink(usize),
-    /// Single wave sin(kq) or cos(kq) of a joint's command.
+    /// Single wave sin(kq) or cos(kq) of a joint's command q with the integer order k.
     Wave {
         /// Joint, counted from 0.
         joint: usize,
         /// Order k.
         order: u32,
-        /// True for a cosine.
+        /// True for the cosine, false for the sine of the command.
         cosine: bool,
     },
     /// Pair sin(kq) and cos(kq), each with a coefficient.
@@ -49,16 +49,17 @@ pub enum Form {
     Strut {
         /// Joint, counted from 0.
         joint: usize,
-        /// Index of the ratio k among [`STRUT_RATIOS`].
+        /// Index in [`STRUT_RATIOS`] of k = 2ab/(a² + b²), the ratio of the lever lengths a and b
+        /// of the gas spring.
         ratio: usize,
     },
     /// Wave sin(a q + b q') or cos(a q + b q') of two joints' commands.
     OfSum {
-        /// Joints of q and q', counted from 0.
+        /// Joints with the commands q and q' of the wave sin(a q + b q'), counted from 0.
         joints: [usize; 2],
-        /// Factors a and b.
+        /// Factors a and b of the wave sin(a q + b q') of two commands.
         factors: [i32; 2],
-        /// True for a cosine.
+        /// True for the cosine, false for the sine of the sum of commands.
         cosine: bool,
     },
     /// Side from which a joint approached the pose, −1 to 1.

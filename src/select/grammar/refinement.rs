@@ -21,10 +21,10 @@ pub(super) struct Refined {
     pub inner: Vec<Vec<f64>>,
     /// ln of the evidence, averaged over the grid cells of the inner parameters, plus `ln_prior`.
     pub ln_posterior: f64,
-    /// ln of the evidence at the values `inner`.
+    /// ln of the evidence of the sum of terms at the values `inner` of the inner parameters.
     pub ln_evidence: f64,
     pub ln_prior: f64,
-    /// Function of the pose that the sum fits to the residual.
+    /// Fitted sum of terms as a function of the pose, with its product with the weight matrix W.
     pub prediction: Weighted,
 }
 

@@ -24,7 +24,7 @@ const ROWS_PER_PRODUCT: usize = 40;
 /// Table of ln p(residual), integrated over the unknown noise factor, by the sum of squares of the
 /// residual.
 pub struct Noise {
-    /// Sum of squares of the residual without additional columns.
+    /// Sum of squares of the whitened residual if no term is added.
     squares: f64,
     /// Degrees of freedom of the residual.
     freedom: f64,
@@ -80,7 +80,8 @@ impl Noise {
 pub struct WhitenedSite {
     /// Vector d: squared length of the lever in each pose, shape = (poses).
     pub diagonal: DVector<f64>,
-    /// Upper triangular factor R with RᵀR = BᵀB, shape = (poses, poses).
+    /// Upper triangular factor R, shape = (poses, poses), of the part RᵀR that the fitted
+    /// parameters explain: W = diag(d) − RᵀR.
     less: DMatrix<f64>,
     /// Vector p: product of each pose's column with the residual, shape = (poses).
     pub product: DVector<f64>,
@@ -91,7 +92,7 @@ pub struct WhitenedSite {
 pub struct Weighted {
     /// Values of the function, shape = (poses).
     pub values: DVector<f64>,
-    /// Weight matrix W times these values.
+    /// Product of the weight matrix W with `values`, shape = (poses).
     pub times: DVector<f64>,
 }
 

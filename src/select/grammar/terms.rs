@@ -66,9 +66,9 @@ pub fn is_separated(terms: &Terms, sum: &Sum, inner: &[Vec<f64>]) -> bool {
 
 /// Group of terms with the same number of columns, and the inner products of these columns in W.
 pub struct Chunk {
-    /// Number of columns of each term.
+    /// Number of columns (1, or 2 for a sine with its cosine) of each term of the group.
     pub width: usize,
-    /// Factors of each term.
+    /// Factors whose product is the term, for each term of the group.
     pub terms: Vec<Product>,
     /// ln of the prior probability of each term.
     pub ln_prior: Vec<f64>,
@@ -76,9 +76,9 @@ pub struct Chunk {
     pub columns: DMatrix<f32>,
     /// Squared length of each column in W; 0 if the fitted parameters explain the column.
     pub squares: Vec<f64>,
-    /// Inner product of the two columns of each term of width 2.
+    /// Inner product in W of the two columns of each term; empty if terms have one column.
     pub mixed: Vec<f64>,
-    /// Inner product of each column with the residual.
+    /// Product of each column with the whitened residual, in the order of `columns`.
     pub along: Vec<f64>,
 }
 
@@ -86,9 +86,10 @@ pub struct Chunk {
 pub struct Terms {
     /// Factors of the dictionary, and after them those with refined inner parameters.
     pub factors: Vec<Factor>,
-    /// Columns of each factor.
+    /// Values of each factor in all poses: one column, or two for a sine with its cosine.
     values: Vec<Vec<DVector<f64>>>,
-    /// Number of factors of the dictionary.
+    /// Number of leading `factors` that are from the dictionary; the later ones have refined inner
+    /// parameters.
     listed: usize,
     /// Terms in groups of equal width.
     pub chunks: Vec<Chunk>,

@@ -50,11 +50,11 @@ impl LinearNeighbourhood {
 /// prediction.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::select) struct LeftOutBlock {
-    /// Sum of squares rᵀr.
+    /// Sum of squares rᵀr of the whitened residuals r of the block, predicted by the other poses.
     pub squares: f64,
-    /// Sum of squares rᵀV⁻¹r in units of their covariance.
+    /// Sum of squares rᵀV⁻¹r of the block, with the covariance V of noise and prediction.
     pub weighted_squares: f64,
-    /// ln det V⁻¹.
+    /// ln det V⁻¹ of the covariance V of the residuals of the block, noise and prediction together.
     pub ln_determinant: f64,
 }
 

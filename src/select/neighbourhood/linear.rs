@@ -37,13 +37,15 @@ pub(crate) struct Unknowns {
 pub(crate) struct LinearNeighbourhood {
     /// Whitened residual at the optimum, followed by the rows of the priors.
     pub(super) residual: DVector<f64>,
-    /// Basis Q, shape = (3 N + priors, rank).
+    /// Orthonormal basis Q = A T of the columns A of the fitted parameters, shape = (3 N + priors,
+    /// rank).
     pub(super) basis: DMatrix<f64>,
-    /// Matrix T, shape = (unknowns, rank).
+    /// Matrix T with Q = A T, shape = (unknowns, rank); T Tᵀ is the covariance of the unknowns.
     root: DMatrix<f64>,
     /// Values of the unknowns at the optimum.
     optimum: DVector<f64>,
-    /// Step from the point of the derivatives to the optimum.
+    /// Step of the unknowns from the point at which the derivatives were computed to the optimum,
+    /// length unknowns.
     step: DVector<f64>,
     /// Number of rows that belong to data.
     pub(super) rows: usize,

@@ -46,7 +46,7 @@ pub(in crate::select) struct Derivatives {
     /// Sites that have a column, each with the column's index: first the columns of `fitted`, then
     /// those of `others`.
     places: Vec<(ParameterSite, usize)>,
-    /// Columns of other sites, each of length 3 N.
+    /// Columns of sites at which no parameter is fitted, each of length 3 N.
     others: Vec<Arc<DVector<f64>>>,
 }
 
@@ -324,7 +324,8 @@ pub(crate) struct EffectTerms {
     /// For each term of each effect: index of its site's column, `None` if no column was computed,
     /// and index of its regressor in `values`.
     terms: Vec<Vec<(Option<usize>, usize)>>,
-    /// Values of each regressor in every pose.
+    /// Value of each regressor (the function of the pose that multiplies a coefficient) in every
+    /// pose.
     values: Vec<Vec<f64>>,
 }
 

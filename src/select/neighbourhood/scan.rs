@@ -26,7 +26,8 @@ pub(crate) struct Scan<'a, 'l> {
     /// For each candidate, the effective number of candidates tried in its family (Bonferroni
     /// factor).
     tries: Vec<f64>,
-    /// Number of families.
+    /// Number of families of effects, by which a p-value is multiplied after the tries in its
+    /// family.
     families: usize,
     /// For each parameter of each candidate, true if it cannot be negative.
     never_negative: Vec<Vec<bool>>,

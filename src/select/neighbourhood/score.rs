@@ -9,9 +9,10 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 /// projected out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Score {
-    /// Gram matrix C̃ᵀC̃ of the projected columns.
+    /// Gram matrix C̃ᵀC̃ of the columns C̃ of the candidate, fitted parameters projected out, shape
+    /// = (k, k).
     pub gram: DMatrix<f64>,
-    /// Product C̃ᵀr of the projected columns with the residual.
+    /// Product C̃ᵀr of the projected columns C̃ with the whitened residual r, length k.
     pub product: DVector<f64>,
     /// Squared length ‖C‖² of each column before the projection.
     pub lengths: Vec<f64>,

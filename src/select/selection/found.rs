@@ -317,7 +317,7 @@ fn alternatives(
 struct Plainer {
     /// Effect of the fit.
     pub effect: Effect,
-    /// Effects that may act together in its place.
+    /// Simpler effects that together explain the residual as well as the effect of the fit.
     pub instead: Vec<Effect>,
     /// Probability of the effect if either the effect or all of `instead` act; both have the same
     /// prior probability.

@@ -32,7 +32,16 @@ impl ClosedLoop {
     /// # Errors
     /// Returns an error if `data` are not those of the loop.
     #[doc(hidden)]
-    pub fn corrected(mut self, data: &Dataset) -> Result<(Self, Option<Fitted>), IdentifyError> {
+    pub fn corrected(self, data: &Dataset) -> Result<(Self, Option<Fitted>), IdentifyError> {
+        let (mut closed, fitted) = self.with_remainder(data)?;
+        if let Some(fitted) = &fitted {
+            fitted.judge_held_out(&mut closed.after);
+        }
+        Ok((closed, fitted))
+    }
+
+    /// Fits the remainder of [`corrected`](Self::corrected).
+    fn with_remainder(mut self, data: &Dataset) -> Result<(Self, Option<Fitted>), IdentifyError> {
         let found_alone = self.found_alone.take();
         if self.interrupted || self.after.has(FindingCode::Misread) {
             return Ok((self, None));

@@ -54,8 +54,9 @@ pub(super) fn of_mixed_units(problem: &Problem, table: &Measurements) -> Vec<Mis
             set.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1).map(|(_, bit)| bit).sum()
         };
         let first = if set.len() > MAX_SUBSETS { all } else { 1 };
-        let sets = if set.len() < turning.len() { first..=all } else { 1..=0 };
-        let sets: Vec<u64> = sets.map(chosen).filter(|joints| joints.count_ones() > 1).collect();
+        let is_mixed = set.len() < turning.len();
+        let sets = (first..=all).map(chosen).filter(|bits| is_mixed && bits.count_ones() > 1);
+        let sets: Vec<u64> = sets.collect();
         sets.into_iter().map(move |joints| Misreading::MixedUnits { joints, is_radians })
     });
     sets.collect()

@@ -294,6 +294,22 @@ impl fmt::Display for Misreading {
                 write!(f, "positions that belong to the configuration {} {rows} {side}", by.abs())?;
                 if from > 0 { write!(f, ", from row {} of the table on", from + 1) } else { Ok(()) }
             }
+            Self::Zero { joint, degrees } => {
+                write!(f, "joint {joint} whose zero position is {degrees}° off")
+            }
+            Self::Ratio { joint, percent } => {
+                let ratio = f64::from(percent) / 100.0;
+                write!(f, "joint {joint} that turns by {ratio} times its command")
+            }
+            _ => self.fmt_of_loads(f),
+        }
+    }
+}
+
+impl Misreading {
+    /// Writes the description of a misreading of images, loads, targets or the joint table.
+    fn fmt_of_loads(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Self::ExchangedAxes => f.write_str("columns u and v that are exchanged"),
             Self::FromBottom => {
                 f.write_str("a column v that counts from the bottom of the image (write height − v)")
@@ -309,22 +325,6 @@ impl fmt::Display for Misreading {
                 let plural = if views == 1 { "" } else { "s" };
                 write!(f, "images that belong to the configuration {views} view{plural} {side}")
             }
-            Self::Zero { joint, degrees } => {
-                write!(f, "joint {joint} whose zero position is {degrees}° off")
-            }
-            Self::Ratio { joint, percent } => {
-                let ratio = f64::from(percent) / 100.0;
-                write!(f, "joint {joint} that turns by {ratio} times its command")
-            }
-            _ => self.fmt_of_loads(f),
-        }
-    }
-}
-
-impl Misreading {
-    /// Writes the description of a misreading of loads, targets, cameras or the joint table.
-    fn fmt_of_loads(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
             Self::Mass { mass: 0, scale } => write!(f, "masses that are {scale}"),
             Self::Mass { mass, scale } => {
                 write!(f, "mass {mass}, counted along the arm, that is {scale}")
