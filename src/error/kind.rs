@@ -117,15 +117,6 @@ pub enum InputErrorKind {
     Negative { value: f64 },
     #[error("{value} is not above zero")]
     NotPositive { value: f64 },
-    #[error(
-        "{value} is not above zero; relative is a multiple of the nominal value{}",
-        if *value > -1.0 && *value < 0.0 {
-            format!(": {:.3} for one that is {:.1} % smaller", 1.0 + value, -100.0 * value)
-        } else {
-            String::new()
-        }
-    )]
-    NotAFactor { value: f64 },
     #[error("{value} is not above zero; for a rigid part leave the key out")]
     StiffnessNotPositive { value: f64 },
     #[error("{value} is not between 0 and 1")]
@@ -427,12 +418,6 @@ pub enum InputErrorKind {
         "the nominal arm has no equilibrium under its loads here; check stiffnesses and masses"
     )]
     NoEquilibrium,
-    #[error(
-        "the identified arm has no equilibrium under the loads of this row{}; check the columns of \
-         loads (payload_kg, hoist_N) and their units",
-        if *others == 0 { String::new() } else { format!(" and of {others} more") }
-    )]
-    LoadsTooLarge { others: usize },
     #[error(
         "the nominal arm has no equilibrium under its loads here; the mass {name} of {mass} kg is \
          {ratio} times as heavy as all others together: check its unit (kg)"

@@ -253,7 +253,7 @@ fn deviation(
         }
     };
     if parameter.unit.is_relative() && value <= 0.0 {
-        return Err(item.error(InputErrorKind::NotAFactor { value }));
+        return Err(item.error(InputErrorKind::NotPositive { value }));
     }
     let is_nominal = (value - parameter.nominal).abs() <= ROUNDING * parameter.nominal.abs();
     if !parameter.unit.is_relative() && value != 0.0 && is_nominal {

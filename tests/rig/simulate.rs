@@ -178,7 +178,7 @@ fn numbers_of_a_truth_that_mean_something_else_are_asked_about() {
         (
             "[noise]\nposition_sigma_mm = 0.05\n[parameters]\n'joint2.stiffness' = { relative = -0.2 }",
             2,
-            "0.800 for one that is 20.0 % smaller",
+            "a multiple of the nominal value, such as 0.8 for one that is 20 % smaller",
         ),
     ] {
         let ranges =
