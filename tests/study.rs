@@ -338,6 +338,12 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
     assert_eq!(results(&bench, "all"), expected);
     assert_eq!(merged.stdout, expected[1]);
     assert_eq!(bench.table("all/timing.csv").rows.len(), CELLS);
+    bench.edit("STUDY.toml", "seed = 7", "seed = 8");
+    let run = bench.flexcal("study merge STUDY.toml --out shared").code(2);
+    assert_contains(
+        &run.stderr,
+        &["12 there are of other inputs, so that the study or its problem"],
+    );
 }
 
 #[test]

@@ -11,6 +11,7 @@ use flexcal::remainder::{self, Bounds};
 use flexcal::report;
 use flexcal::results::{AcceptanceRecord, AcceptanceResult, Document as _};
 
+use super::flags::is_tiny;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::progress::Line;
@@ -126,6 +127,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else if judged.are_poses_fitted {
             "hold out poses that are not fitted, as held_out = { fraction = 0.3, seed = 1 } does, then the same command again"
                 .to_owned()
+        } else if arguments.tolerance_mm.is_some_and(is_tiny) {
+            "give --tolerance-mm in millimetres, as the warning says".to_owned()
         } else if verdict == Some(Verdict::Fail.as_str()) {
             let page = page.display();
             format!(

@@ -68,7 +68,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         CheckedPoses::Drawn(..) => "",
     };
     if let CheckedPoses::Table { poses, .. } = &poses {
-        common.hint(poses.still_joints().into_iter().map(|joint| {
+        let is_moved = |joint: &usize| problem.joints[*joint].command_kind() != JointKind::Fixed;
+        common.hint(poses.still_joints().into_iter().filter(is_moved).map(|joint| {
             format!(
                 "joint {} stands still in all poses, so that they do not tell what its other \
                  coordinates would show; vary it",

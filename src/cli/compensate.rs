@@ -157,7 +157,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 advice::strategy_argument(&estimate)
             )
         } else if misplaced.is_some() {
-            "correct the frame or the unit of the targets, as the warning says".to_owned()
+            "correct the table of targets, or name its frame, as the warning says".to_owned()
         } else if reached == 0 {
             "check the unit and the frame of the targets (--frame base takes them in the frame of the base) and the limits of the \
              joints"

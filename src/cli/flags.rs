@@ -11,6 +11,11 @@ use super::output::{self, Results, WriteError};
 /// Smallest tolerance that is plausible \[mm\]: arms repeat to some hundredths of a millimetre.
 const MIN_TOLERANCE_MM: f64 = 1e-3;
 
+/// Returns true if a tolerance \[mm\] is too small for an arm, as one in metres is.
+pub fn is_tiny(tolerance_mm: f64) -> bool {
+    tolerance_mm < MIN_TOLERANCE_MM
+}
+
 /// Arguments for the folder of the results and the format of the output.
 #[derive(Debug, Clone, Args)]
 pub struct Flags {
@@ -56,7 +61,7 @@ impl Flags {
 
     /// Warns of a tolerance \[mm\] that is too small for an arm, as one in metres is.
     pub fn warn_if_tiny(&self, tolerance_mm: Option<f64>) {
-        self.hint(tolerance_mm.filter(|mm| *mm < MIN_TOLERANCE_MM).map(|tolerance| {
+        self.hint(tolerance_mm.filter(|mm| is_tiny(*mm)).map(|tolerance| {
             format!(
                 "a tolerance of {tolerance} mm is below what an arm holds; if it is in metres, \
                  write --tolerance-mm {}",

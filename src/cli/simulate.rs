@@ -47,6 +47,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(&arguments.problem)?;
     let truth = Truth::read(&arguments.truth, &problem)?;
+    arguments.flags.hint(truth.large_noise());
     let files =
         [file_in(&arguments.problem, "problem.toml"), file_in(&arguments.truth, "TRUTH.toml")];
     let inputs = [&files[..], &problem.data.files, &arguments.data].concat();

@@ -419,12 +419,6 @@ pub enum InputErrorKind {
     )]
     NoEquilibrium,
     #[error(
-        "the identified arm has no equilibrium under the loads of this row{}; check the columns of \
-         loads (payload_kg, hoist_N) and their units",
-        if *others == 0 { String::new() } else { format!(" and of {others} more") }
-    )]
-    LoadsTooLarge { others: usize },
-    #[error(
         "the nominal arm has no equilibrium under its loads here; the mass {name} of {mass} kg is \
          {ratio} times as heavy as all others together: check its unit (kg)"
     )]

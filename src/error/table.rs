@@ -113,6 +113,12 @@ pub enum TableErrorKind {
          = 0.3, seed = 1 }}"
     )]
     NothingHeldOut,
+    #[error(
+        "the identified arm has no equilibrium under the loads of this row{}; check the columns of \
+         loads (payload_kg, hoist_N) and their units",
+        if *others == 0 { String::new() } else { format!(" and of {others} more") }
+    )]
+    LoadsTooLarge { others: usize },
     #[error("no rows below the header")]
     NoRowsBelowHeader,
     #[error(

@@ -149,9 +149,10 @@ pub enum WarningKind {
     )]
     TimeGoesBack { rows: usize, back: String },
     #[error(
-        "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
+        "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}{}; used all the same", plural(*rows),
+        other_unit.as_ref().map_or_else(String::new, |unit| format!(", {unit}"))
     )]
-    BeyondLimits { rows: usize, worst: String, limits: String },
+    BeyondLimits { rows: usize, worst: String, limits: String, other_unit: Option<String> },
     #[error(
         "{value} looks like radians of {degrees}°, and the key means degrees; write {radians} = \
          {value}, or {degrees} here"
@@ -225,6 +226,8 @@ pub enum WarningKind {
          and max_rad instead of min_deg and max_deg"
     )]
     LimitsLookLikeRadians { widest: String },
+    #[error("a limit of {turns} turns; if it is in degrees, write {write}")]
+    LimitLooksLikeDegrees { turns: String, write: String },
     #[error(
         "a focal length of {focal} px is short for an image that is {width} px wide; if it is in \
          millimetres, divide it by the size of a pixel in millimetres"
@@ -249,9 +252,12 @@ pub enum WarningKind {
     NoGravity,
     #[error(
         "the reference is {distance} K beyond all temperatures of the table ({least} °C to {most} °C), so \
-         that parameters at the reference are extrapolated; check the reference"
+         that parameters at the reference are extrapolated; {}",
+        celsius.as_ref().map_or("check the reference".to_owned(), |celsius| {
+            format!("if it is in degrees Fahrenheit, write {celsius}")
+        })
     )]
-    FarReference { distance: String, least: String, most: String },
+    FarReference { celsius: Option<String>, distance: String, least: String, most: String },
     #[error(
         "the columns approach1, approach2, … hold 0 and 1 alone; 0 is an unknown direction, and −1 one \
          from larger values"

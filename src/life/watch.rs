@@ -15,7 +15,7 @@ use super::pairs::with_pairs;
 use super::relocation::{self, LocatedAnew, Placed};
 use super::reporter::{Change, Reporter, WatchedCause};
 use super::rows::{SensitiveRows, SharedMisfit, warmth};
-use crate::error::InputErrorKind;
+use crate::error::TableErrorKind;
 use crate::fit::{self, Placement, SavedEstimate, register};
 use crate::measurement::Measurements;
 use crate::model::parameter::ParameterSite;
@@ -148,7 +148,7 @@ pub fn watch(
     let earlier = Earlier::of_estimate(estimate, problem, &model, days)?;
     let predicted = fit::predict(problem, Some(estimate), &kept, None)?;
     if let [first, others @ ..] = predicted.lost_rows().as_slice() {
-        let kind = InputErrorKind::LoadsTooLarge { others: others.len() };
+        let kind = TableErrorKind::LoadsTooLarge { others: others.len() };
         return Err(kept.location(*first).error(kind).into());
     }
     let x = predicted.x;

@@ -9,6 +9,12 @@ use crate::quantity::format::{decimals, number};
 
 /// Largest excess over a joint limit that counts as rounding \[rad\] or \[m\].
 const LIMIT_TOLERANCE: f64 = 1e-6;
+/// Smallest ratio of a command in metres to the limit of its joint at which it is probably in
+/// millimetres.
+const MIN_MILLIMETRE_RATIO: f64 = 50.0;
+/// Smallest ratio of a command in degrees to the limit of its joint at which it is probably a count
+/// of an encoder.
+const MIN_COUNTS_RATIO: f64 = 4.0;
 /// Number of turns from zero above which a warning suggests that a column in radians is in degrees.
 const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
 /// Highest plausible temperature [°C]. Above it, a warning suggests that the column is in kelvins;
@@ -259,7 +265,15 @@ impl Measurements {
             // The iterator is reversed so that the first of equals wins.
             let worst = *rows.iter().rev().max_by(|&&a, &&b| beyond(a).total_cmp(&beyond(b)))?;
             let location = self.location(worst).with_key(format!("joint {}", column.joint + 1));
+            let ratio = value(worst).abs() / min.abs().max(max.abs());
+            let other_unit = match column.unit() {
+                "m" if ratio > MIN_MILLIMETRE_RATIO => Some("millimetres"),
+                "deg" if ratio > MIN_COUNTS_RATIO => Some("counts of an encoder"),
+                _ => None,
+            };
             let kind = WarningKind::BeyondLimits {
+                other_unit: other_unit
+                    .map(|unit| format!("{ratio:.0} times the limit: are these {unit}?")),
                 rows: rows.len(),
                 worst: format!("{} = {}", column.name, column.shown(value(worst))),
                 limits: column.limits((min, max)),

@@ -84,7 +84,8 @@ impl Measurements {
         (different.len() > 1 && looks_like_weights).then(|| self.warning(row, "payload_kg", kind))
     }
 
-    /// Returns a warning if the reference temperature is far beyond all temperatures.
+    /// Returns a warning if the reference temperature is far beyond all temperatures, or beyond them
+    /// and among them if it is in degrees Fahrenheit.
     pub(super) fn far_reference(&self, problem: &Problem) -> Option<Warning> {
         let reference = problem.data.reference_temperature?;
         let values = || self.temperature.iter().flatten().copied();
@@ -92,13 +93,20 @@ impl Measurements {
             (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
         let distance = (least - reference).max(reference - most);
         let is_far = distance > MIN_FAR_REFERENCE.max(most - least) && distance.is_finite();
+        // A room temperature in degrees Fahrenheit, among those of the table if in °C.
+        let celsius = (reference - 32.0) / 1.8;
+        let is_fahrenheit = distance > 0.0
+            && ROOM_FAHRENHEIT.contains(&reference)
+            && (least..=most).contains(&celsius);
         let kind = WarningKind::FarReference {
+            celsius: is_fahrenheit.then(|| format!("{celsius:.1}")),
             distance: format!("{distance:.0}"),
             least: format!("{least}"),
             most: format!("{most}"),
         };
         let location = problem.data.location.clone().with_key("data.reference_temperature_C");
-        is_far.then_some(Warning { location: Location { excerpt: None, ..location }, kind })
+        (is_far || is_fahrenheit)
+            .then_some(Warning { location: Location { excerpt: None, ..location }, kind })
     }
 
     /// Returns a warning, located at the first row, if all directions of approach are 0 or 1 and

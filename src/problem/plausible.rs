@@ -15,6 +15,8 @@ const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 /// Largest usual limit of a joint \[rad\]. If no limit in degrees is larger than this number, the
 /// limits are suspected to be in radians.
 const MAX_LIMIT_RADIANS: f64 = TAU + 0.02;
+/// Largest plausible limit of a joint in radians \[turns\].
+const MAX_LIMIT_TURNS: f64 = 6.0;
 /// Largest plausible distance of a fixture from the origin of the measuring frame, or between two
 /// points, as a multiple of the length of the arm's links.
 const MAX_FIXTURE_LINKS: f64 = 20.0;
@@ -45,6 +47,15 @@ pub(super) fn joint_warnings(section: &Section<'_, '_>) -> Vec<Warning> {
                 degrees: format!("{:.0}", angle.to_degrees()),
                 radians: format!("{}_rad", key.trim_end_matches("_deg")),
             };
+            warnings.push(Warning { location: item.location(), kind });
+        }
+    }
+    for key in ["min_rad", "max_rad"] {
+        let Some(item) = section.peek(key) else { continue };
+        let turns = item.number().map_or(0.0, |limit| limit.abs() / TAU);
+        if turns > MAX_LIMIT_TURNS && turns.is_finite() {
+            let write = key.replace("_rad", "_deg");
+            let kind = WarningKind::LimitLooksLikeDegrees { turns: number(turns, 0), write };
             warnings.push(Warning { location: item.location(), kind });
         }
     }

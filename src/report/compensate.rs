@@ -218,15 +218,22 @@ fn common_offset(targets: &Measurements, commands: &[Command]) -> Option<String>
 /// Returns a warning if the joint columns lead so far from the targets that they do not tell which
 /// of the configurations that reach a target is meant.
 fn far_starts(targets: &Measurements, commands: &[Command]) -> Option<String> {
-    let miss = mean_miss(commands);
-    (targets.position_measured && miss > MIN_FAR_START).then(|| {
-        format!(
-            "the targets are {:.0} mm on average from where their joint columns lead, so that the \
-             commands may be of another configuration of the arm than is meant: check units, order \
-             and names of the joint columns before the arm is moved",
-            miss * 1e3
-        )
-    })
+    let is_far = |command: &&Command| command.seed_miss > MIN_FAR_START;
+    let far: Vec<&Command> = commands.iter().filter(is_far).collect();
+    let is_warned = targets.position_measured && mean_miss(commands) > MIN_FAR_START;
+    let first = targets.location(far.first().filter(|_| is_warned)?.row);
+    let what = if 2 * far.len() > commands.len() {
+        "units, order and names of the joint columns".to_owned()
+    } else {
+        format!("the positions and joint angles of these targets, the first at {first},")
+    };
+    Some(format!(
+        "{} of {} targets are {} mm or more from where their joint columns lead, so that their commands \
+         may be of another configuration of the arm than is meant: check {what} before the arm is moved",
+        far.len(),
+        commands.len(),
+        MIN_FAR_START * 1e3
+    ))
 }
 
 /// Returns a warning if targets with orientations are not reached by an arm of fewer than six

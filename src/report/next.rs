@@ -8,7 +8,7 @@ use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError}
 use crate::fit::Noise;
 use crate::measurement::Measurements;
 use crate::problem::Problem;
-use crate::quantity::format::{counted, mm, number, or_dash};
+use crate::quantity::format::{about_three_digits, counted, mm, number, or_dash};
 use crate::results::{CommandedJoint, commanded_joints, pose_columns};
 
 /// Largest ratio of the tolerance to the bound that it does not exceed, above which its unit is
@@ -163,7 +163,10 @@ pub(super) fn command_table(problem: &Problem, poses: &Measurements) -> Table {
 /// States whether enough poses are measured, or after how many more there are expected to be
 /// enough.
 fn verdict(options: &NextOptions, next: &NextPoses) -> String {
-    let tolerance = options.tolerance.map(|length| mm(length, 3));
+    let tolerance = options.tolerance.map(|length| match mm(length, 3) {
+        zero if zero == "0.000" => about_three_digits(length * 1e3),
+        shown => shown,
+    });
     if !next.found.is_trusted() {
         return "Not judged, because the fit to the measured poses is not to be trusted."
             .to_owned();

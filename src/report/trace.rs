@@ -7,6 +7,7 @@ use super::document::{Block, MIN_PROBABLE, Point, joined, opening, percent};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::format_chi2;
 use super::render::Story;
+use super::unexplained::missing_sigma;
 use super::verdict::declared;
 use super::{effect, figures, residual_tests};
 use crate::fit::Identification;
@@ -33,7 +34,11 @@ pub fn trace(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Stor
     let result = TraceResult::new(problem, trace);
     let mut blocks = opening(&problem.title, headline(&trace.fit)).to_vec();
     blocks.push(Block::Text(verdict(&result)));
-    blocks.extend(hypothesis_sets(&result));
+    blocks.extend(missing_sigma(&trace.fit).map(Block::Text));
+    // Beside a fit that is not to be trusted, explanations are of its mistake.
+    if result.trusted {
+        blocks.extend(hypothesis_sets(&result));
+    }
     blocks.extend([
         Block::heading("Tests of the residual (measured − predicted) of the identification poses"),
         Block::List(residual_tests::by_outcome(&trace.residual_tests)),

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::document::{MIN_PROBABLE, code, percent};
-use crate::fit::Noise;
+use crate::fit::{Identification, Noise};
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::are_all_fixed;
 use crate::problem::{Effect, JointKind, Problem};
@@ -54,12 +54,7 @@ pub(super) fn to_declare(
             code("reference_temperature_C")
         ));
     }
-    if closure.before.fit.noise != Noise::Declared {
-        declarations.push(format!(
-            "Declare {} in [data], 1 σ of a measured coordinate. Without it the size of the residual cannot be judged.",
-            code("position_sigma_mm")
-        ));
-    }
+    declarations.extend(missing_sigma(&closure.before.fit));
     let limits = result.structures().filter_map(|left| {
         let probability = left.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
         Some((left.limit.as_deref()?, probability))
@@ -289,4 +284,15 @@ fn unit_of(problem: &Problem, covariate: &Covariate) -> (f64, &'static str) {
         Covariate::Command(_) => (180.0 / std::f64::consts::PI, " °"),
         _ => (1.0, ""),
     }
+}
+
+/// Asks for σ of the measurements, without which the size of the residual cannot be judged; `None` if
+/// it is declared.
+pub(super) fn missing_sigma(fit: &Identification) -> Option<String> {
+    (fit.noise != Noise::Declared).then(|| {
+        format!(
+            "Declare {} in [data], 1 σ of a measured coordinate. Without it the size of the residual cannot be judged.",
+            code("position_sigma_mm")
+        )
+    })
 }

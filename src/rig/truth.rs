@@ -80,7 +80,23 @@ pub enum HeldOutRows {
     AllBut(usize),
 }
 
+/// Largest usual noise of a measured position \[m\].
+const MAX_USUAL_NOISE: f64 = 0.01;
+
 impl Truth {
+    /// Returns a warning if the noise of positions is so large that it is probably in millimetres under
+    /// a key in metres.
+    pub(crate) fn large_noise(&self) -> Option<String> {
+        (self.noise_sigma > MAX_USUAL_NOISE).then(|| {
+            format!(
+                "noise of {} mm a coordinate is large for an instrument; if {sigma} mm are meant, write \
+                 position_sigma_mm = {sigma}",
+                self.noise_sigma * 1e3,
+                sigma = self.noise_sigma
+            )
+        })
+    }
+
     /// Returns true if an effect depends on earlier poses.
     pub(super) fn has_memory(&self) -> bool {
         self.effects

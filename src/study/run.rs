@@ -17,10 +17,14 @@ pub enum RunError {
     #[error(transparent)]
     Store(#[from] StoreError),
     #[error(
-        "{missing} of {parts} parts of the study are missing in {}; run the study or the missing shards",
-        list(folders)
+        "{missing} of {parts} parts of the study are missing in {}; {}run the study or the missing shards",
+        list(folders),
+        match others {
+            0 => String::new(),
+            _ => format!("{others} there are of other inputs, so that the study or its problem was changed since: "),
+        }
     )]
-    Incomplete { missing: usize, parts: usize, folders: Vec<PathBuf> },
+    Incomplete { missing: usize, parts: usize, others: usize, folders: Vec<PathBuf> },
 }
 
 /// Returns the parts of a shard that the store does not contain yet.
@@ -97,7 +101,9 @@ pub fn collect(study: &Study, stores: &[Store]) -> Result<Results, RunError> {
     }
     if missing > 0 {
         let folders = stores.iter().map(|store| store.folder().to_owned()).collect();
-        return Err(RunError::Incomplete { missing, parts: parts.len(), folders });
+        let (parts, kept) = (parts.len(), stores.iter().map(Store::len).sum::<usize>());
+        let others = kept.saturating_sub(parts - missing);
+        return Err(RunError::Incomplete { missing, parts, others, folders });
     }
     Ok(Results { cells })
 }

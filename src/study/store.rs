@@ -1,7 +1,7 @@
 //! Finished parts on disk, one small file each, written atomically.
 
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
 
@@ -103,6 +103,11 @@ impl Store {
     /// Returns the folder of the parts.
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// Returns the number of files in the folder; 0 if it cannot be read.
+    pub(super) fn len(&self) -> usize {
+        fs::read_dir(&self.folder).map_or(0, |entries| entries.flatten().count())
     }
 
     /// Writes a finished part.

@@ -112,6 +112,11 @@ fn quiet_says_in_one_line_why_the_status_is_1() {
         assert!(run.stdout.is_empty() && run.stderr.lines().count() == 1, "{run:?}");
         assert_contains(&run.stderr, &["the fit is not to be trusted: "]);
     }
+    // Without a trusted fit there is no explanation, and without σ its size is not judged.
+    folder.edit("problem.toml", "position_sigma_mm = 0.05\n", "");
+    let said = folder.flexcal("trace . --out out").code(1).words();
+    assert_contains(&said, &["Declare position_sigma_mm in [data]", "No cause is claimed"]);
+    assert!(!said.contains("Most probable explanations"), "{said}");
 }
 
 #[test]

@@ -174,6 +174,23 @@ fn an_estimate_that_was_changed_is_refused_or_said() {
         folder.flexcal(&format!("predict problem.toml {data} {more}"))
     };
     predict("").success();
+    // Grams under kilograms leave the arm without an equilibrium.
+    let heavy = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if cells[9].parse::<f64>().is_ok_and(|mass| mass > 0.0) {
+            cells[9] = "1e6";
+        }
+        cells.join(",") + "\n"
+    };
+    folder.write("heavy.csv", folder.read("a-none.csv").lines().map(heavy).collect::<String>());
+    let estimate = "problem.toml --data heavy.csv --estimate out/estimate.json --out heavy";
+    let run = folder.flexcal(&format!("predict {estimate}")).code(1);
+    assert_contains(&run.stdout, &["Next: correct the loads (payload_kg, hoist_N)"]);
+    let run = folder.flexcal(&format!("watch {estimate}")).code(2);
+    assert_contains(
+        &run.stderr,
+        &["heavy.csv:", "no equilibrium under the loads of this row and of"],
+    );
     let whole = folder.read(ESTIMATE);
     let estimate = folder.json(ESTIMATE)["parameters"][0]["estimate"].to_string();
     folder.edit(ESTIMATE, &format!("\"estimate\": {estimate}"), "\"estimate\": 0.125");

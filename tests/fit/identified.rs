@@ -247,6 +247,9 @@ fn an_estimate_applies_to_another_session_without_a_refit() {
     let bare = |line: &str| line.splitn(7, ',').take(6).collect::<Vec<_>>().join(",") + "\n";
     folder.write("bare.csv", folder.read("B.csv").lines().map(bare).collect::<String>());
     let run = folder.flexcal(&format!("{predict} --out bare --data bare.csv")).code(2);
-    assert_contains(&run.stderr, &["has no estimate of base[B].x"]);
+    assert_contains(
+        &run.stderr,
+        &["session \"B\" of the table was not identified; identified are \"A\""],
+    );
     assert!(!folder.has("bare"));
 }

@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
 use crate::common::arms::path;
+use crate::common::program::{Folder, assert_contains};
 
 /// Arms that are identified from measurements of the rig.
 const ARMS: u64 = 20;
@@ -90,4 +91,25 @@ fn accept_tests_a_tolerance() {
     assert_eq!((status, &open["tolerance"]["verdict"]), (Some(1), &"undecided".into()));
     // 0.999²⁹⁹⁴ = 0.05002 and 0.999²⁹⁹⁵ = 0.04997.
     assert_eq!(open["tolerance"]["poses_to_pass"], 2995);
+}
+
+#[test]
+fn poses_that_are_fitted_too_decide_nothing() {
+    let folder = Folder::with_lunar_sampler();
+    let table = folder.read("a-none.csv");
+    let fitted = table.lines().filter(|line| line.contains(",identification,"));
+    // The copies are measured anew, 0.02 mm apart.
+    let copies = fitted.clone().map(|line| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[1] = "validation".to_owned();
+        cells[6] = format!("{:.4}", cells[6].parse::<f64>().unwrap() + 0.02);
+        cells.join(",")
+    });
+    let rows: Vec<String> =
+        table.lines().take(1).chain(fitted.clone()).map(str::to_owned).chain(copies).collect();
+    folder.write("a-none.csv", rows.join("\n") + "\n");
+    let run = folder.flexcal("accept . --tolerance-mm 100 --out out").code(1);
+    assert_contains(&run.stdout, &["Undecided: the arm was fitted to the poses that are held out"]);
+    assert_contains(&run.stdout, &["Next: hold out poses that are not fitted"]);
+    assert!(!run.stdout.contains("took part in no fit"), "{run:?}");
 }

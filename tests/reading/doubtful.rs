@@ -180,12 +180,15 @@ fn quantities_that_contradict_the_problem_are_named() {
     let sides = |least: f64| column("approach2", &|k| if k % 2 == 0 { 1.0 } else { least });
     let reference =
         |value: f64| format!("{ARM}{}", data(&format!("reference_temperature_C = {value}\n")));
-    let cases: [(String, String, bool, Expected); 10] = [
+    let cases: [(String, String, bool, Expected); 11] = [
         (soft("gravity_m_s2 = [0, 0, 0]\n") + &data(""), plain(), true, |k| {
             matches!(k, WarningKind::NoGravity)
         }),
         (soft("") + &data(""), plain(), false, |k| matches!(k, WarningKind::NoGravity)),
         (reference(68.0), warm(15.0), true, |k| matches!(k, WarningKind::FarReference { .. })),
+        (reference(68.0), column("temperature_C", &|k| 15.0 + k as f64), true, |k| {
+            matches!(k, WarningKind::FarReference { celsius: Some(_), .. })
+        }),
         (reference(20.0), warm(25.0), false, |k| matches!(k, WarningKind::FarReference { .. })),
         (reference(20.0), sides(0.0), true, |k| matches!(k, WarningKind::ApproachWithoutSign)),
         (reference(20.0), sides(-1.0), false, |k| matches!(k, WarningKind::ApproachWithoutSign)),

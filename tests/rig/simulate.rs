@@ -171,6 +171,25 @@ fn measurements_that_nothing_can_be_identified_from_say_so() {
 }
 
 #[test]
+fn numbers_of_a_truth_that_mean_something_else_are_asked_about() {
+    let folder = Folder::new();
+    for (text, status, expected) in [
+        ("[noise]\nposition_sigma_m = 0.05", 0, "if 0.05 mm are meant, write position_sigma_mm"),
+        (
+            "[noise]\nposition_sigma_mm = 0.05\n[parameters]\n'joint2.stiffness' = { relative = -0.2 }",
+            2,
+            "a multiple of the nominal value, such as 0.8 for one that is 20 % smaller",
+        ),
+    ] {
+        let ranges =
+            "[poses]\nq1_deg = [0, 9]\nq2_deg = [0, 9]\nq3_deg = [0, 9]\nq4_deg = [0, 9]\n";
+        folder.write("TRUTH.toml", format!("{ranges}{text}\n"));
+        let run = folder.flexcal(&simulate_cases("TRUTH.toml", 5)).code(status);
+        assert_contains(&run.stderr, &[expected]);
+    }
+}
+
+#[test]
 fn ranges_go_by_the_names_of_joints_as_columns_do() {
     let arm = "name = 'a'\n[[joint]]\nname = 'waist'\n[[joint]]\nname = 'left arm'\nkind = 'prismatic'\n               [[joint]]\nname = 'twin'\n[[joint]]\nname = 'twin'\n[[joint]]\nname = 'hoist'\n";
     let problem = parse(arm);

@@ -119,9 +119,9 @@ pub fn held_out_positions(
 ) -> Result<Vec<usize>, IdentifyError> {
     let is_position = |row: &usize| measurements.observation(*row).is_position();
     let rows: Vec<usize> = split.held_out.iter().copied().filter(is_position).collect();
-    let error = |kind| Err(problem.data.held_out_location.clone().error(kind).into());
     if problem.data.held_out == Some(HeldOut::Nothing) {
-        return error(TableErrorKind::NothingHeldOut);
+        let location = problem.data.held_out_location.clone();
+        return Err(location.error(TableErrorKind::NothingHeldOut).into());
     }
     if rows.is_empty() {
         return Err(problem.data.location.clone().error(TableErrorKind::NoPositionsHeldOut).into());

@@ -7,7 +7,7 @@ use nalgebra::{DVector, Vector3};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::apply::predict::{Residual, in_space};
 use crate::fit::apply::saved_estimate::SavedEstimate;
-use crate::fit::apply::saved_estimate_error::SavedEstimateError;
+use crate::fit::apply::saved_estimate_error::{SavedEstimateError, missing};
 use crate::fit::checks::point_spread::{PointSpread, spreads};
 use crate::fit::checks::required_columns::check_columns;
 use crate::fit::errors::of_kind;
@@ -60,8 +60,7 @@ pub struct Prediction {
 
 impl Prediction {
     /// Returns the indices of the rows in which the arm has no equilibrium.
-    #[doc(hidden)]
-    pub fn lost_rows(&self) -> Vec<usize> {
+    pub(crate) fn lost_rows(&self) -> Vec<usize> {
         let is_lost = |position: &Vector3<f64>| !position.iter().all(|x| x.is_finite());
         (0..self.positions.len()).filter(|&row| is_lost(&self.positions[row])).collect()
     }
@@ -92,7 +91,13 @@ pub enum PredictError {
     /// The measured rows of a session, tool or fixture that the estimate lacks do not determine its
     /// pose.
     #[error(
-        "{name} is not in the estimate, and its rows do not determine it; measure more poses there"
+        "{name} is not in the estimate, and its rows do not determine it; measure more poses there{}",
+        if name.starts_with("base[") {
+            ", or, if base and instrument stand where they stood, give these rows a session of the \
+             estimate"
+        } else {
+            ""
+        }
     )]
     Open {
         /// Name of the parameter that the rows do not determine.
@@ -197,11 +202,7 @@ pub fn predict(
     missing.retain(|&k| is_needed(k));
     if !missing.is_empty() && rows.position_measured {
         if let Some(k) = too_few(&model, &poses, &missing) {
-            let name = &model.parameters[k].name;
-            return Err(match model.parameters[k].site {
-                ParameterSite::Fixture { .. } => undetermined_error(estimate, name.clone()),
-                _ => missing_parameter_error(estimate, name),
-            });
+            return Err(undetermined_error(estimate, model.parameters[k].name.clone()));
         }
         x = fit_placements(&model, &poses, &missing, x).map_err(|error| match error {
             PredictError::Open { name } => undetermined_error(estimate, name),
@@ -277,9 +278,7 @@ pub fn predict(
 fn missing_parameter_error(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
     let name = name.to_owned();
     match estimate {
-        Some(SavedEstimate { file, .. }) => {
-            SavedEstimateError::Missing { file: file.clone(), name }.into()
-        }
+        Some(estimate) => missing(estimate.file.clone(), name, |kind| estimate.words(kind)).into(),
         None => PredictError::OpenWithoutEstimate { name },
     }
 }

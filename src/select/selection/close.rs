@@ -138,8 +138,13 @@ pub fn close_by(
     let declared = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&declared, &data);
     let mut state = SearchState::new(&stoppable, options, &declared);
-    // With a lens error no effect is searched, because it would be mistaken for one of the arm.
-    let result = if declared.found.has(FindingCode::LensContradicted) {
+    // With a lens error no effect is searched, because it would be mistaken for one of the arm. None
+    // explains errors as large as the spread of the measurements.
+    let is_hopeless =
+        declared.found.finding(FindingCode::MissesMeasurements).is_some_and(|misses| {
+            misses.number("rms").unwrap_or(f64::INFINITY) > misses.number("spread").unwrap_or(0.0)
+        });
+    let result = if is_hopeless || declared.found.has(FindingCode::LensContradicted) {
         Ok((declared.clone(), None))
     } else {
         with_misread_effect(&mut state, &declared)

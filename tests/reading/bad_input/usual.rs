@@ -194,3 +194,25 @@ fn a_rule_that_a_later_rule_replaces_is_named() {
     let kind = WarningKind::RuleOverridden { by: "joint*.*".to_owned(), line: 6 };
     assert_eq!(warned(&format!("{one}\n{all}")), [(Some(5), kind)]);
 }
+
+#[test]
+fn limits_in_another_unit_are_asked_about() {
+    let arm = parse(&format!("{ARM}min_rad = -140\nmax_rad = 3\n"));
+    let (turns, write) = ("22".to_owned(), "min_deg".to_owned());
+    let expected = WarningKind::LimitLooksLikeDegrees { turns, write };
+    let kinds: Vec<_> = arm.plausibility_warnings().into_iter().map(|of| of.kind).collect();
+    assert_eq!(kinds, [expected]);
+    let rail = format!("{ARM}kind = 'prismatic'\nmin_m = 0\nmax_m = 6\n");
+    for (command, expected) in [("5994.3", Some("999 times the limit")), ("6.3", None)] {
+        let table = format!("q1_m,x_mm,y_mm,z_mm\n{command},1,2,3\n");
+        let (_, warnings) = try_table(&parse(&rail), &table).unwrap();
+        let hint = warnings.iter().find_map(|warning| match &warning.kind {
+            WarningKind::BeyondLimits { other_unit, .. } => Some(other_unit.as_deref()),
+            _ => None,
+        });
+        assert_eq!(
+            hint.unwrap().map(|hint| hint.starts_with(expected.unwrap())),
+            expected.map(|_| true)
+        );
+    }
+}
