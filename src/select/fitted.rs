@@ -463,7 +463,9 @@ fn squared_distances(
 ) -> Vec<f64> {
     let (basis, residual) = (fit.fitted(), fit.residual().rows(0, fit.rows()));
     let mut is_aside = vec![false; residual.len() / 3];
-    aside.iter().for_each(|&pose| is_aside[pose] = true);
+    for &pose in aside {
+        is_aside[pose] = true;
+    }
     let rows_aside: Vec<usize> = aside.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
     let (removed, weight) =
         (basis.select_rows(&rows_aside), 1.0 - SIGMA_FACTOR_OF_OUTLIERS.powi(-2));

@@ -230,7 +230,7 @@ fn promising(fit: &CheckedFit) -> Option<Vec<String>> {
     let all = joints.flat_map(|joint| FIELDS.map(|field| format!("joint{joint}.{field}")));
     let held: Vec<String> = all.filter(|name| !is_free(name)).collect();
     let problem = with_free(fit.problem, held.iter().cloned());
-    let mut gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))??;
+    let mut gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))?;
     gains.retain(|(_, share)| *share >= MIN_EXPECTED_SHARE);
     gains.sort_by(|a, b| b.1.total_cmp(&a.1));
     gains.truncate(MAX_FITTED);
@@ -239,7 +239,7 @@ fn promising(fit: &CheckedFit) -> Option<Vec<String>> {
 
 /// Returns the share of the misfit beyond noise that each of the `held` parameters is expected to
 /// take away, with its index, at the parameters of `fit`. `fitting` has all of them free.
-fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Option<Vec<(usize, f64)>> {
+fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Vec<(usize, f64)> {
     let names = fit.fitting.model.parameters.iter().map(|parameter| parameter.name.as_str());
     let known: std::collections::HashMap<&str, f64> =
         names.zip(fit.end.x.iter().copied()).collect();
@@ -285,5 +285,5 @@ fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Option<Vec<(us
         (after > MIN_OWN_SHARE * before).then(|| (index, slope * slope / after / misfit))
     };
     let placed = places.iter().enumerate().filter_map(|(index, place)| Some((index, (*place)?)));
-    Some(placed.enumerate().filter_map(gain).collect())
+    placed.enumerate().filter_map(gain).collect()
 }

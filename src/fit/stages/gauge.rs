@@ -87,7 +87,9 @@ pub(in crate::fit) fn in_order(
         let mut weights: Vec<(usize, f64)> = moved.collect();
         weights.sort_by_key(|&(j, _)| j);
         let sign = weights.first().map_or(1.0, |(_, weight)| weight.signum());
-        weights.iter_mut().for_each(|(_, weight)| *weight *= sign);
+        for (_, weight) in &mut weights {
+            *weight *= sign;
+        }
         UnidentifiableCombination { weights, ..*combination }
     };
     combinations.iter().map(renumbered).collect()

@@ -48,13 +48,13 @@ pub fn of(
         };
         let places: Vec<usize> = (0..rows.len()).filter(|&place| is_moved(place)).collect();
         let moved_rows: Vec<usize> = places.iter().map(|&place| rows[place]).collect();
-        let mut changes: Vec<_> = errors.iter().map(|error| error - error).collect();
+        let mut changes: Vec<_> = errors.iter().map(|error| error * 0.0).collect();
         for (place, without) in places.into_iter().zip(poses.errors(&without, &moved_rows)) {
             changes[place] = without - errors[place];
         }
         let squares: Vec<f64> = changes
             .iter()
-            .map(|change| change.norm_squared())
+            .map(nalgebra::Matrix::norm_squared)
             .filter(|square| square.is_finite())
             .collect();
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
