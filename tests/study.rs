@@ -263,7 +263,7 @@ fn damaged_and_foreign_parts_are_not_used() {
     let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();
     assert_contains(&message, &["tally: changed since flexcal wrote it"]);
     let unsealed = format!("{}}}", cell.split(",\n  \"digest\"").next().unwrap());
-    let newer = cell.replacen("\"version\": 2", "\"version\": 99", 1);
+    let newer = cell.replacen("\"version\": 2", "\"version\": 99", 1).replacen("tally", "sums", 1);
     for (text, expected) in [(unsealed, "digest: changed since"), (newer, "format: version 99")] {
         fs::write(&other, text).unwrap();
         let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();

@@ -132,6 +132,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         diagnostic::print(&error);
         return 2;
     }
+    if !matches!(cli.command, Command::Completions(_) | Command::Man(_))
+        && let Err(error) = threads::start()
+    {
+        diagnostic::print(&error);
+        return 2;
+    }
     let outcome = match cli.command {
         Command::Init(arguments) => init::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),

@@ -1,6 +1,10 @@
-//! Check of the number of threads that the environment variable `RAYON_NUM_THREADS` requests.
+//! Threads of a command: their number, which the environment variable `RAYON_NUM_THREADS` requests,
+//! and their start.
 
-use std::{env, thread};
+use std::error::Error as _;
+use std::{env, io, thread};
+
+use rayon::ThreadPoolBuilder;
 
 /// Environment variable with the number of threads.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
@@ -16,6 +20,26 @@ const MAX_THREADS: usize = 256;
 pub struct BadThreads {
     text: String,
     max: usize,
+}
+
+/// Error for threads that the system does not start.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "no threads for the computation: {reason}; raise the limits of processes and memory (ulimit -u, -v), or set {VARIABLE}=1"
+)]
+pub struct NoThreads {
+    reason: io::Error,
+}
+
+/// Starts the threads among which the library divides its work.
+pub fn start() -> Result<(), NoThreads> {
+    match ThreadPoolBuilder::new().build_global() {
+        // An error without a cause means that the threads run already.
+        Err(error) if error.source().is_some() => {
+            Err(NoThreads { reason: io::Error::other(error) })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Returns an error if the environment requests no valid number of threads. Must be called before

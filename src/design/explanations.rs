@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::InputError;
-use crate::files::{FORMAT_VERSION, Format, read_limited, was_changed};
+use crate::files::{FORMAT_VERSION, newer_version, read_limited, was_changed};
 use crate::measurement::Measurements;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
@@ -54,8 +54,6 @@ pub enum ExplanationsError {
 
 #[derive(Deserialize)]
 struct Document {
-    #[serde(default)]
-    format: Format,
     problem: String,
     effects: Vec<Found>,
     #[serde(default)]
@@ -85,12 +83,11 @@ impl Explanations {
         let named = || file.to_owned();
         let unreadable = |source| ExplanationsError::Unreadable { file: named(), source };
         let bytes = read_limited(file, MAX_FILE_MIB << 20).map_err(unreadable)?;
-        let document: Document = serde_json::from_slice(&bytes)
-            .map_err(|source| ExplanationsError::Syntax { file: named(), source })?;
-        let version = document.format.version;
-        if version > FORMAT_VERSION {
+        if let Some(version) = newer_version(&bytes) {
             return Err(ExplanationsError::Newer { file: named(), version });
         }
+        let document: Document = serde_json::from_slice(&bytes)
+            .map_err(|source| ExplanationsError::Syntax { file: named(), source })?;
         if was_changed(file) {
             return Err(ExplanationsError::Changed { file: named() });
         }

@@ -24,3 +24,18 @@ impl Format {
         Self { name: Cow::Borrowed(name), version: FORMAT_VERSION }
     }
 }
+
+/// Returns the version of the format of a JSON file if it is newer than this program.
+pub(crate) fn newer_version(json: &[u8]) -> Option<u32> {
+    /// Head of the file: all that a newer version is sure to share.
+    #[derive(Deserialize)]
+    struct Head {
+        format: Version,
+    }
+    #[derive(Deserialize)]
+    struct Version {
+        version: u32,
+    }
+    let head: Head = serde_json::from_slice(json).ok()?;
+    Some(head.format.version).filter(|version| *version > FORMAT_VERSION)
+}

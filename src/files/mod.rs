@@ -14,8 +14,8 @@ use std::io;
 use std::path::Path;
 
 pub use batch::Batch;
-pub(crate) use format::Format;
 pub use format::{FORMAT_VERSION, PROGRAM};
+pub(crate) use format::{Format, newer_version};
 pub use lock::{FolderLock, MAX_LOCK_WAIT};
 pub use record::{FolderRecord, digest, was_changed};
 pub use sealed::Changes;

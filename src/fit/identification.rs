@@ -21,6 +21,7 @@ use crate::fit::influential_rows::influential_rows;
 use crate::fit::outcome::{Estimate, Identification, enter};
 use crate::fit::stages::custom_solver::CustomSolver;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
+use crate::fit::stages::gauge::in_order;
 use crate::fit::stages::noise_model::{MIN_SIGMA, NoiseModel};
 use crate::fit::stages::placement::ASSUMED_SIGMA;
 use crate::fit::stages::stage::StageError;
@@ -227,6 +228,7 @@ fn fit_rows(
     } else {
         Vec::new()
     };
+    let order = whole.model_order();
     let (noise_factor, sigma_taken) = assumed_noise(&whole, measurements.leading());
     let told = options.earlier.is_none()
         && asked
@@ -294,6 +296,7 @@ fn fit_rows(
     } else {
         (not_converged.into_iter().collect(), None)
     };
+    let columns = if asked { order.clone() } else { Vec::new() };
     Ok(Identification {
         provisional: options.provisional,
         misread,
@@ -319,14 +322,14 @@ fn fit_rows(
         noise_models: (fitting.noise_model, fitting.turn_noise_model),
         kinds: fitting.errors_by_kind(&start, &end.x),
         spreads,
-        weak: end.gauge.weak.clone(),
+        weak: in_order(&end.gauge.weak, &order),
         orientation: fitting.orientation(&start, &end.x),
         coordinates: whole.count(),
-        whitened_triangle: (whitened_triangle, OnceLock::new()),
+        whitened_triangle: (whitened_triangle, columns, OnceLock::new()),
         estimates,
         covariance: covariance.finish(),
         prior_sizes,
-        unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
+        unknowns: order.iter().map(|&place| unknowns[place].name.clone()).collect(),
         active_constraints: ActiveConstraint::all(
             &statistics.constraints,
             &statistics.prices.constraints,

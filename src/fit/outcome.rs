@@ -136,9 +136,9 @@ pub struct Identification {
     pub coordinates: usize,
     /// Names of the fitted parameters, in the order of [`Identification::identifiability`].
     pub unknowns: Vec<String>,
-    /// Triangular factor of the whitened Jacobian of the unknowns, without priors, at the
-    /// registered nominal arm, and its identifiability analysis, computed on first use.
-    pub(super) whitened_triangle: (DMatrix<f64>, OnceLock<Identifiability>),
+    /// Triangular factor of the whitened Jacobian, without priors, at the registered nominal arm,
+    /// the column of each unknown in it, and its identifiability analysis, computed on first use.
+    pub(super) whitened_triangle: (DMatrix<f64>, Vec<usize>, OnceLock<Identifiability>),
     /// True if the fit is provisional: another one follows, so the identifiability and most checks
     /// are left out.
     pub(crate) provisional: bool,
@@ -230,8 +230,8 @@ impl Identification {
     /// Returns the identifiability of the fitted parameters at the registered nominal arm; it is
     /// computed on the first call.
     pub fn identifiability(&self) -> &Identifiability {
-        let (triangle, found) = &self.whitened_triangle;
-        found.get_or_init(|| Identifiability::of(triangle))
+        let (triangle, columns, found) = &self.whitened_triangle;
+        found.get_or_init(|| Identifiability::in_order(triangle, columns))
     }
 
     /// Returns the texts of the findings in [`cautions`](Self::cautions), with their remedies.

@@ -7,6 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::inverse::regular_inverse;
 use super::singular::SingularValues;
+use super::tridiagonal::eigenvalues_with_components;
+use crate::numeric::gram;
 
 /// Largest scaled singular value, relative to the largest of all, that counts as zero.
 ///
@@ -26,6 +28,16 @@ const MIN_CERTAIN_FULL_RANK: f64 = 2.0 * UNIDENTIFIABLE_BELOW;
 /// Largest trailing pivot of the pivoted QR, relative to the first pivot, whose direction is
 /// certainly unidentifiable.
 const MAX_CERTAIN_NULL_PIVOT: f64 = 1e-12;
+
+/// Number of columns from which singular values are those of the normal matrix where that is
+/// accurate: an SVD takes ten times as long.
+const MANY_COLUMNS: usize = 600;
+/// Smallest singular value, relative to the largest one, that is taken from the normal matrix. Its
+/// relative error is then about 1e-6.
+const MIN_ROOT_OF_EIGENVALUE: f64 = 1e-5;
+/// Smallest entry on the diagonal of a triangle with unit columns up to which no column is
+/// permuted.
+const MIN_LEADING_PIVOT: f64 = 1e-4;
 
 /// Identifiability of the unknowns, from the triangular factor R of the Jacobian.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,16 +72,27 @@ impl Identifiability {
     /// Analyses the Jacobian with triangular factor `triangle` (n × n).
     #[doc(hidden)]
     pub fn of(triangle: &DMatrix<f64>) -> Self {
+        Self::in_order(triangle, &(0..triangle.ncols()).collect::<Vec<_>>())
+    }
+
+    /// Analyses what [`of`](Self::of) does, for the unknowns in another order: unknown j of the
+    /// result is column `order[j]` of `triangle`.
+    pub(crate) fn in_order(triangle: &DMatrix<f64>, order: &[usize]) -> Self {
         let ScaledTriangle { matrix: scaled, scale } = ScaledTriangle::of(triangle);
-        let SingularValues { values: singular_values, right } = SingularValues::of(&scaled);
-        let threshold = UNIDENTIFIABLE_BELOW * singular_values.first().copied().unwrap_or(0.0);
-        let rank = singular_values.iter().filter(|&&value| value > threshold).count();
-        let null = orthogonal_complement(&right.columns(0, rank).into_owned());
+        let (singular_values, rank, null) = of_many(&scaled).unwrap_or_else(|| {
+            let SingularValues { values, right } = SingularValues::of(&scaled);
+            let threshold = UNIDENTIFIABLE_BELOW * values.first().copied().unwrap_or(0.0);
+            let rank = values.iter().filter(|&&value| value > threshold).count();
+            let null = orthogonal_complement(&right.columns(0, rank).into_owned());
+            (values, rank, null)
+        });
+        let null = null.select_columns(order);
+        let scale: Vec<f64> = order.iter().map(|&column| scale[column]).collect();
         let UnidentifiableSpace { gauge, visible } = UnidentifiableSpace::of(&null, &scale);
         Self {
             singular_values,
             rank,
-            unidentifiable: echelon_combinations(null, &scaled),
+            unidentifiable: echelon_combinations(null, &scaled.select_columns(order)),
             gauge,
             visible,
         }
@@ -128,7 +151,7 @@ impl UnidentifiableSpace {
         if regular_inverse(&scaled, MIN_CERTAIN_FULL_RANK).is_some() {
             return Self { gauge: DMatrix::zeros(0, n), visible: vec![1.0; n] };
         }
-        if let Some(null) = certain_null(&scaled) {
+        if let Some(null) = certain_null_of_many(&scaled).or_else(|| certain_null(&scaled, 0)) {
             return Self::of(&null, &scale);
         }
         let Identifiability { gauge, visible, .. } = Identifiability::of(triangle);
@@ -176,18 +199,53 @@ impl ScaledTriangle {
     }
 }
 
-/// Returns orthonormal rows that span the null space of a matrix with unit columns; `None` if
-/// pivoted QR cannot decide the rank with certainty.
-fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// Returns singular values, rank and null space of a matrix with many columns of unit norm; `None`
+/// if it has few columns, or if only an SVD decides the rank and gives the values.
+///
+/// The values are the roots of the eigenvalues of the normal matrix, whose errors are relative to
+/// the largest one. The null space is that of [`UnidentifiableSpace::in_triangle`].
+fn of_many(scaled: &DMatrix<f64>) -> Option<(Vec<f64>, usize, DMatrix<f64>)> {
     let n = scaled.ncols();
-    let qr = scaled.clone().col_piv_qr();
-    let triangle = qr.r();
-    let largest = triangle.get((0, 0))?.abs();
-    let rank =
-        (0..n).take_while(|&k| triangle[(k, k)].abs() > MAX_CERTAIN_NULL_PIVOT * largest).count();
+    if n < MANY_COLUMNS {
+        return None;
+    }
+    let null = match regular_inverse(scaled, MIN_CERTAIN_FULL_RANK) {
+        Some(_) => DMatrix::zeros(0, n),
+        None => certain_null_of_many(scaled)?,
+    };
+    let rank = n - null.nrows();
+    let squares = eigenvalues_with_components(gram(scaled), &DVector::zeros(n))?;
+    let mut values: Vec<f64> =
+        squares.into_iter().map(|(square, _)| square.max(0.0).sqrt()).collect();
+    values.sort_by(|a, b| b.total_cmp(a));
+    values[rank..].fill(0.0);
+    (values[rank - 1] > MIN_ROOT_OF_EIGENVALUE * values[0]).then_some((values, rank, null))
+}
+
+/// Returns what [`certain_null`] returns, if the matrix has many columns. The first columns, up to
+/// a small entry on the diagonal, are not permuted.
+fn certain_null_of_many(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let is_regular = |&k: &usize| scaled[(k, k)].abs() > MIN_LEADING_PIVOT;
+    let leading = (0..scaled.ncols()).take_while(is_regular).count();
+    if scaled.ncols() < MANY_COLUMNS { None } else { certain_null(scaled, leading) }
+}
+
+/// Returns orthonormal rows that span the null space of a matrix with unit columns; `None` if
+/// pivoted QR cannot decide the rank with certainty. The first `leading` columns, which must form
+/// an upper triangle, are not permuted.
+fn certain_null(scaled: &DMatrix<f64>, leading: usize) -> Option<DMatrix<f64>> {
+    let (n, behind) = (scaled.ncols(), scaled.ncols() - leading);
+    let qr = scaled.view((leading, leading), (behind, behind)).into_owned().col_piv_qr();
+    let mut triangle = scaled.clone();
+    qr.p().permute_columns(&mut triangle.columns_mut(leading, behind));
+    triangle.view_mut((leading, leading), (behind, behind)).copy_from(&qr.r());
+    let largest = triangle.diagonal().amax();
+    let is_large = |&k: &usize| triangle[(k, k)].abs() > MAX_CERTAIN_NULL_PIVOT * largest;
+    let rank = (0..n).take_while(is_large).count();
     let remainder = triangle.view((rank, rank), (n - rank, n - rank)).norm();
     if rank == 0
         || rank == n
+        || rank < leading
         || remainder.is_nan()
         || remainder > MAX_CERTAIN_NULL_PIVOT * n as f64 * largest
     {
@@ -200,7 +258,7 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     null.rows_mut(0, rank)
         .copy_from(&(inverse * triangle.view((0, rank), (rank, n - rank)) * -1.0));
     null.rows_mut(rank, n - rank).fill_with_identity();
-    qr.p().inv_permute_rows(&mut null);
+    qr.p().inv_permute_rows(&mut null.rows_mut(leading, behind));
     Some(null.qr().q().transpose())
 }
 
@@ -337,7 +395,7 @@ mod tests {
         assert!((unscaled(&triangle) * rows.transpose()).amax() < 1e-12);
         // The tests without singular values find the same space.
         let blind = UnidentifiableSpace::in_triangle(&triangle);
-        assert!(certain_null(&ScaledTriangle::of(&triangle).matrix).is_some());
+        assert!(certain_null(&ScaledTriangle::of(&triangle).matrix, 0).is_some());
         let recovered = unscaled(&blind.gauge);
         assert!((recovered.transpose() * &recovered - rows.transpose() * &rows).amax() < 1e-12);
         assert!(

@@ -4,6 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::numeric::kernel::{dot, norm};
 
+/// Largest share of non-zero entries, 1 / this number, of a row that is multiplied entry by entry.
+const MIN_ENTRIES_PER_NONZERO: usize = 8;
+
 /// Returns R⁻¹ if every singular value of R is certainly above `least` times the largest; `None`
 /// otherwise, or if R is not upper triangular.
 ///
@@ -17,6 +20,9 @@ pub(super) fn regular_inverse(triangle: &DMatrix<f64>, least: f64) -> Option<DMa
     for (j, column) in inverse.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
         column[j] = 1.0;
         for k in (0..=j).rev() {
+            if column[k] == 0.0 {
+                continue;
+            }
             let upper = &triangle.as_slice()[k * n..=k * n + k];
             let value = column[k] / upper[k];
             column[k] = value;
@@ -38,11 +44,23 @@ pub(super) fn sum_of_inverse_row_squares(
         return None;
     }
     let mut row = DVector::zeros(n);
+    // Entries of the row that are not zero: few if the triangle is sparse.
+    let mut filled = Vec::with_capacity(n);
     let squares = weighted.map(|(j, weight)| {
         row[j] = weight / triangle[(j, j)];
+        filled.clear();
+        filled.push(j);
         for i in j + 1..n {
             let column = &triangle.as_slice()[i * n..(i + 1) * n];
-            row[i] = -dot(&column[j..i], &row.as_slice()[j..i]) / column[i];
+            let sum = if MIN_ENTRIES_PER_NONZERO * filled.len() < i - j {
+                filled.iter().map(|&k| column[k] * row[k]).sum()
+            } else {
+                dot(&column[j..i], &row.as_slice()[j..i])
+            };
+            row[i] = -sum / column[i];
+            if row[i] != 0.0 {
+                filled.push(i);
+            }
         }
         row.rows_range(j..).norm_squared()
     });

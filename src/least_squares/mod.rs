@@ -15,6 +15,7 @@ mod loss;
 mod objective;
 mod singular;
 pub mod solver;
+mod sparse;
 mod triangle;
 mod tridiagonal;
 mod uncertainty;

@@ -17,7 +17,7 @@ const WIDE_PANEL: usize = 96;
 /// Number of reflectors in the narrower panel, and in each part of the widest one.
 const NARROW_PANEL: usize = 32;
 /// Number of columns from which reflectors are applied as matrix products.
-const MIN_BLOCKED_COLUMNS: usize = 128;
+pub(super) const MIN_BLOCKED_COLUMNS: usize = 128;
 
 /// Running triangular factor of all rows absorbed so far.
 ///
@@ -28,9 +28,9 @@ const MIN_BLOCKED_COLUMNS: usize = 128;
 /// of R and the rows of the block. Work: 2 n² per row, memory: n². No m × n matrix is ever kept.
 #[derive(Debug, Clone)]
 pub struct Triangle {
-    parameters: usize,
+    pub(super) parameters: usize,
     /// Triangular factor R of all absorbed rows beside the projected residual c, row after row.
-    rows: Vec<f64>,
+    pub(super) rows: Vec<f64>,
     /// Sum of squares ‖r‖² of all rows absorbed.
     squares: f64,
 }
@@ -171,7 +171,7 @@ impl Triangle {
 
     /// Reduces the block to zero, panel after panel. `filled(k)` bounds the number of non-zero rows
     /// of its first k columns.
-    fn reduce(&mut self, block: &mut Block, filled: impl Fn(usize) -> usize) {
+    pub(super) fn reduce_dense(&mut self, block: &mut Block, filled: impl Fn(usize) -> usize) {
         let (n, m) = (self.parameters, block.rows);
         debug_assert_eq!(n, block.parameters);
         if m == 0 {

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::Triangle;
 use super::inverse::regular_inverse;
 use super::singular::SingularValues;
+use super::sparse::square_of_rows;
 
 /// Factor by which gauge rows are multiplied so that they act as constraints: the variance along
 /// them falls below rounding.
@@ -105,5 +106,5 @@ fn inverse_of_normal_matrix(mut a: DMatrix<f64>) -> DMatrix<f64> {
     for (mut row, scale) in v.row_iter_mut().zip(scale.iter()) {
         row.unscale_mut(*scale);
     }
-    &v * v.transpose()
+    square_of_rows(&v)
 }

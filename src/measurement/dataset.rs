@@ -7,9 +7,12 @@ use crate::error::{InputError, InputErrorKind, Location, Warning};
 use crate::problem::pattern::matches;
 use crate::problem::{Freedom, Problem};
 
-/// Maximum number of sessions whose bases are fitted, and of targets whose tools are fitted. The
-/// time of a fit grows with the cube of their number: 50 take a second, 200 some minutes.
-const MAX_FITTED_SETUPS: usize = 150;
+/// Maximum number of sessions whose bases are fitted. They take some ten seconds; covariances and
+/// correlations of all parameters grow with the square of their number.
+pub(crate) const MAX_FITTED_BASES: usize = 150;
+/// Maximum number of sessions or targets whose tools are fitted. A tool has half as many parameters
+/// as a base.
+const MAX_FITTED_TOOLS: usize = 500;
 
 /// Measured poses with their split into fitted rows and held-out rows, which are only used to judge
 /// the fit.
@@ -43,14 +46,17 @@ fn check_setups(problem: &Problem, measurements: &Measurements) -> Result<(), In
             rule.is_some_and(|rule| !matches!(rule.freedom, Freedom::Fixed))
         })
     };
-    let targets = measurements.target.as_ref().map_or(0, |target| target.names.len());
     let sessions = measurements.session.names.len();
-    for (parameters, what, found) in [
-        ("base", "sessions, each with a base of its own", sessions),
-        ("tool", "targets, each with a tool of its own", targets),
+    let (tools, targets) = match &measurements.target {
+        Some(target) => ("targets, each with a tool of its own", target.names.len()),
+        None => ("sessions, each with a tool of its own", sessions),
+    };
+    for (parameters, what, found, most) in [
+        ("base", "sessions, each with a base of its own", sessions, MAX_FITTED_BASES),
+        ("tool", tools, targets, MAX_FITTED_TOOLS),
     ] {
-        if found > MAX_FITTED_SETUPS && is_fitted(parameters) {
-            let kind = InputErrorKind::TooMany { what, found, most: MAX_FITTED_SETUPS };
+        if found > most && is_fitted(parameters) {
+            let kind = InputErrorKind::TooMany { what, found, most };
             let file = measurements.files.first().cloned().unwrap_or_default();
             return Err(Location::file(&file).error(kind));
         }

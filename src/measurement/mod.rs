@@ -78,6 +78,7 @@ pub use builder::{DatasetBuilder, DatasetError};
 #[doc(hidden)]
 pub use column_table::{ColumnTable, ColumnValues};
 pub use dataset::Dataset;
+pub(crate) use dataset::MAX_FITTED_BASES;
 pub(crate) use order::RowOrder;
 pub(crate) use repeats::count_distinct;
 pub use split::Split;

@@ -14,6 +14,7 @@ use crate::fit::{
 use crate::least_squares::MANY_UNKNOWNS;
 use crate::model::parameter::{BeamField, ParameterSite, Regressor};
 use crate::model::{Model, Pose};
+use crate::numeric::{gram, inverse_factor, product_with_upper};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Factor on σ that gives an outlier practically no weight.
@@ -404,21 +405,34 @@ fn find_outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     };
     // The concentration steps use the rows of the evidence, the final steps all rows.
     let (rows, subset) = (data.rows(), data.evidence_rows());
-    let linearised = fitted.linearised_at(data, &subset, &[]);
+    let is_whole = rows.len() == subset.len();
+    let linearised = if is_whole {
+        fitted.linearised(data, &[])
+    } else {
+        fitted.linearised_at(data, &subset, &[])
+    };
+    let fit = fitted.neighbourhood(&linearised);
     let mut aside = Vec::new();
     for _ in 0..MAX_CONCENTRATION_STEPS {
-        let next = worst(&squared_distances(fitted, &linearised, &aside), allowed(subset.len()));
+        let squares = squared_distances(fitted, (&linearised, &fit), &aside);
+        let next = worst(&squares, allowed(subset.len()));
         if next == aside {
             break;
         }
         aside = next;
     }
-    let linearised = fitted.linearised(data, &[]);
+    let (linearised, fit) = if is_whole {
+        (linearised, fit)
+    } else {
+        let linearised = fitted.linearised(data, &[]);
+        let fit = fitted.neighbourhood(&linearised);
+        (linearised, fit)
+    };
     let kept: BTreeSet<usize> =
         (0..subset.len()).filter(|k| !aside.contains(k)).map(|k| subset[k]).collect();
     let mut aside: Vec<usize> = (0..rows.len()).filter(|&k| !kept.contains(&rows[k])).collect();
     for _ in 0..MAX_CONCENTRATION_STEPS {
-        let squares = squared_distances(fitted, &linearised, &aside);
+        let squares = squared_distances(fitted, (&linearised, &fit), &aside);
         let outlier_count =
             squares.iter().filter(|square| **square > OUTLIER_SQUARED_DISTANCE).count();
         if outlier_count > allowed(rows.len()) {
@@ -434,29 +448,39 @@ fn find_outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
 }
 
 /// Returns the squared distance of each pose from the fit without the poses `aside`, in units of
-/// the variance of one coordinate.
+/// the variance of one coordinate. `fit` is the linear neighbourhood with all poses.
 ///
 /// The squared distance is rᵀ C⁻¹ r divided by the scatter: the median over all poses relative to
 /// that of normal residuals, at least 1 if σ is declared. C = 1 − H for a pose in the fit, C = 1 +
-/// A (AᵀA)⁻¹ Aᵀ for one that was left out, with A its rows of the Jacobian.
-fn squared_distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
-    let (whole, residual) = (linearised.fitted(), linearised.residual());
-    let (mut columns, mut here) = (whole.clone(), residual.clone());
+/// H for one that was left out.
+///
+/// With Q the orthonormal basis of all poses, Q_S its rows of the poses `aside`, and weights 1 − w
+/// of these: G = 1 − w Q_SᵀQ_S, H = Q G⁻¹ Qᵀ, and r changes by w Q G⁻¹ Q_Sᵀr_S.
+fn squared_distances(
+    fitted: &Fitted,
+    (linearised, fit): (&Linearised, &LinearNeighbourhood),
+    aside: &[usize],
+) -> Vec<f64> {
+    let (basis, residual) = (fit.fitted(), fit.residual().rows(0, fit.rows()));
     let mut is_aside = vec![false; residual.len() / 3];
     for &pose in aside {
         is_aside[pose] = true;
-        columns.rows_mut(3 * pose, 3).unscale_mut(SIGMA_FACTOR_OF_OUTLIERS);
-        here.rows_mut(3 * pose, 3).unscale_mut(SIGMA_FACTOR_OF_OUTLIERS);
     }
-    let unknowns = fitted.unknowns_without(linearised, &[], 1.0);
-    let fit = LinearNeighbourhood::new(&columns, &here, &unknowns, linearised.empty());
-    let (left, along) = (residual + whole * fit.step(), fit.fitted());
+    let rows_aside: Vec<usize> = aside.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
+    let (removed, weight) =
+        (basis.select_rows(&rows_aside), 1.0 - SIGMA_FACTOR_OF_OUTLIERS.powi(-2));
+    let n = basis.ncols();
+    let within = inverse_factor(&(DMatrix::identity(n, n) - gram(&removed) * weight))
+        .unwrap_or_else(|| DMatrix::identity(n, n));
+    let along = product_with_upper(&basis.into_owned(), &within.transpose());
+    let step = &within * removed.tr_mul(&residual.select_rows(&rows_aside)) * weight;
+    let left = residual + &along * step;
     let square = |pose: usize| {
         let (rows_of_pose, r) =
             (along.rows(3 * pose, 3), left.fixed_rows::<3>(3 * pose).into_owned());
         let hat = Matrix3::from_fn(|i, j| rows_of_pose.row(i).dot(&rows_of_pose.row(j)));
         let covariance = if is_aside[pose] {
-            Matrix3::identity() + hat * SIGMA_FACTOR_OF_OUTLIERS.powi(2)
+            Matrix3::identity() + hat
         } else {
             Matrix3::identity() * (1.0 + MIN_VARIANCE_OF_POSE) - hat
         };

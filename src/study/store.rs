@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::definition::{Cell, Part, Study};
 use super::key::key;
 use super::tally::Tally;
-use crate::files::{FORMAT_VERSION, Format, PROGRAM, changed_key, read_text, sealed, write_new};
+use crate::files::{
+    FORMAT_VERSION, Format, PROGRAM, changed_key, newer_version, read_text, sealed, write_new,
+};
 
 /// Number of hexadecimal digits of the key that form the file name of a part.
 const NAME_DIGITS: usize = 16;
@@ -134,14 +136,14 @@ impl Store {
             Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(source) => return Err(StoreError::Unreadable { path, source }),
         };
+        if let Some(version) = newer_version(text.as_bytes()) {
+            return Err(StoreError::Newer { path, version });
+        }
         let finished: FinishedPart = match serde_json::from_str(&text) {
             Ok(finished) => finished,
             Err(source) => return Err(StoreError::Damaged { path, source }),
         };
         match changed_key(&text) {
-            _ if finished.format.version > FORMAT_VERSION => {
-                Err(StoreError::Newer { path, version: finished.format.version })
-            }
             Ok(Some(key)) => Err(StoreError::Changed { path, key }),
             _ if finished.key == key => Ok(Some(finished)),
             _ => Err(StoreError::Foreign { path }),

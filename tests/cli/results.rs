@@ -153,7 +153,7 @@ fn changed_poses_are_said_and_newer_or_endless_numbers_refused() {
     let run = folder.flexcal(again).success();
     assert_contains(&run.stderr, &["out/measurements.csv: changed since flexcal wrote it; used"]);
     let format = "\"format\": {\"name\": \"flexcal-loop\", \"version\": 99}";
-    let newer = format!("{{{format}, \"problem\": \"lunar-sampler\", \"effects\": []}}");
+    let newer = format!("{{{format}, \"causes\": []}}");
     folder.write("loop.json", newer);
     let run = folder.flexcal("next . --truth . --for causes --explanations loop.json").code(2);
     assert_contains(&run.stderr, &["loop.json: format: version 99"]);

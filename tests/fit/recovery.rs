@@ -421,3 +421,36 @@ fn results_do_not_depend_on_the_number_of_threads() {
     assert_eq!(one, two);
     assert!(one.0.iter().any(|&bits| bits != 0));
 }
+
+#[test]
+fn an_arm_and_the_tools_of_many_sessions_are_recovered() {
+    let problem = parse(
+        "name = 'arm'\n[[joint]]\nalpha_deg = 90\nd_m = 0.4\n[[joint]]\na_m = 0.5\n[[joint]]\na_m = 0.4\n\
+         [parameters]\n'joint*.a' = { sigma_mm = 5 }\n'joint*.theta' = { sigma_deg = 1 }\n'base.*' = { fixed = true }\n\
+         'tool.*' = { sigma_mm = 5 }\n[data]\nposition_sigma_mm = 0.01\n",
+    );
+    let mut rows = at_random(&problem, 200, 1.5, &mut rng());
+    let words: Vec<String> = (0..200).map(|row| format!("s{}", row % 50)).collect();
+    rows.session = labels(words.iter().map(String::as_str));
+    let model = model_of(&problem, &rows);
+    let truth = draw(&model, |_| 0.0, &mut rng());
+    measure(&problem, &mut rows, &truth, 1e-5, &mut rng());
+    let found = fit(&problem, &rows, &split_at(200, &rows));
+    let names: Vec<&String> = model.parameters.iter().map(|parameter| &parameter.name).collect();
+    assert_eq!(found.unknowns.iter().collect::<Vec<_>>(), names);
+    for (k, estimate) in found.estimates.iter().enumerate() {
+        let error = (found.x[k] - truth[k]).abs();
+        assert!(error < 5.0 * estimate.std_error.unwrap(), "{} {error}", estimate.name);
+    }
+    // The parameters of sessions precede those of the arm among the unknowns; an optimum of the
+    // cost has no slope in either.
+    let at = |k: usize, step: f64| {
+        let mut x = found.x.clone();
+        x[k] += step;
+        cost(&problem, &rows, &split_at(200, &rows), &x)
+    };
+    for k in [0, 2, 5, names.len() / 2, names.len() - 1] {
+        let step = found.estimates[k].std_error.unwrap();
+        assert!((at(k, step) - at(k, -step)).abs() < 1e-3, "{}", names[k]);
+    }
+}

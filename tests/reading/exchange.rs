@@ -411,7 +411,11 @@ fn more_sessions_than_can_be_fitted_are_refused_at_once() {
     };
     let error = try_dataset(&arm("{ free = true }"), &table).unwrap_err();
     assert_says(&error, &["rows.csv: 1000 sessions, each with a base of its own; at most 150"]);
-    read_dataset(&arm("{ fixed = true }"), &table);
+    let fixed = "{ fixed = true }\n'tool.*' = { fixed = true }";
+    read_dataset(&arm(fixed), &table);
+    let error =
+        try_dataset(&arm("{ fixed = true }\n'tool.*' = { sigma_mm = 5 }"), &table).unwrap_err();
+    assert_says(&error, &["rows.csv: 1000 sessions, each with a tool of its own; at most 500"]);
     // Rules of other parameters, and rules that a later one overrides, free no base.
     read_dataset(&arm("{ fixed = true }\n'*.theta' = { free = true }"), &table);
     read_dataset(&arm("{ free = true }\n'*' = { fixed = true }"), &table);

@@ -10,7 +10,8 @@ use super::finding::{Finding, FindingCode};
 use super::row_kind::format_error;
 use crate::fit::Noise;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
-use crate::least_squares::jacobian_and_residual;
+use crate::least_squares::{Linearisation, Triangle, jacobian_and_residual};
+use crate::measurement::MAX_FITTED_BASES;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Observation, ParameterRule, Problem};
 use crate::quantity::Unit;
@@ -32,8 +33,8 @@ const MAX_FITTED: usize = 3;
 /// Smallest squared length of a column, as a fraction of its length before the free parameters are
 /// fitted, at which the data tell the held parameter from them.
 const MIN_OWN_SHARE: f64 = 1e-6;
-/// Ridge on the diagonal of the normal matrix of the free parameters, as a fraction of the entry
-/// there.
+/// Squared length of the row that keeps a free parameter determined, as a fraction of the squared
+/// length of its column.
 const RIDGE: f64 = 1e-12;
 /// Largest ratio of the mean square of left-out errors to that of the best held parameter, at which
 /// another one acts alike.
@@ -101,7 +102,9 @@ impl Trial {
 /// Returns the finding that names the held parameter which explains most of the misfit.
 fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
     let names = promising(fit).unwrap_or_default();
-    let may_move = !fit.is_base_free();
+    // A problem with the base free is refused beyond this number.
+    let sessions = fit.fitting.measurements.session.names.len();
+    let may_move = !fit.is_base_free() && sessions <= MAX_FITTED_BASES;
     if names.is_empty() && !may_move {
         return None;
     }
@@ -219,16 +222,15 @@ fn with_free(declared: &Problem, names: impl IntoIterator<Item = String>) -> Pro
 
 /// Returns the held parameters that promise to explain most of the misfit, best first.
 ///
-/// The gain in χ² of a column h beside the columns J of the free parameters is
-/// (hᵀ r − hᵀ J N⁻¹ g)² / (hᵀ h − hᵀ J N⁻¹ Jᵀ h), with the normal matrix N = Jᵀ J + Λ, the gradient
-/// g = Jᵀ r + Λ x and the information Λ of the priors.
+/// The gain in χ² of a column h is (h⊥ᵀ r)² / ‖h⊥‖², where h⊥ is the part of h outside the columns
+/// of the free parameters. These columns and r are extended by the rows of the priors.
 fn promising(fit: &CheckedFit) -> Option<Vec<String>> {
     let is_free = |name: &str| fit.fitting.model.parameters.iter().any(|found| found.name == name);
     let joints = 1..=fit.problem.joints.len();
     let all = joints.flat_map(|joint| FIELDS.map(|field| format!("joint{joint}.{field}")));
     let held: Vec<String> = all.filter(|name| !is_free(name)).collect();
     let problem = with_free(fit.problem, held.iter().cloned());
-    let mut gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))??;
+    let mut gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))?;
     gains.retain(|(_, share)| *share >= MIN_EXPECTED_SHARE);
     gains.sort_by(|a, b| b.1.total_cmp(&a.1));
     gains.truncate(MAX_FITTED);
@@ -237,7 +239,7 @@ fn promising(fit: &CheckedFit) -> Option<Vec<String>> {
 
 /// Returns the share of the misfit beyond noise that each of the `held` parameters is expected to
 /// take away, with its index, at the parameters of `fit`. `fitting` has all of them free.
-fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Option<Vec<(usize, f64)>> {
+fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Vec<(usize, f64)> {
     let names = fit.fitting.model.parameters.iter().map(|parameter| parameter.name.as_str());
     let known: std::collections::HashMap<&str, f64> =
         names.zip(fit.end.x.iter().copied()).collect();
@@ -257,27 +259,31 @@ fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Option<Vec<(us
     let is_known = |k: &usize| known.contains_key(parameters[*k].name.as_str());
     let free: Vec<usize> =
         (0..whole.unknowns.len()).filter(|&j| is_known(&whole.unknowns[j])).collect();
-    let columns = jacobian.select_columns(&free);
-    let mut normal = columns.tr_mul(&columns);
-    let mut gradient = columns.tr_mul(&residual);
-    for (j, &column) in free.iter().enumerate() {
+    let places: Vec<Option<usize>> = held
+        .iter()
+        .map(|name| place(parameters.iter().position(|parameter| parameter.name == *name)?))
+        .collect();
+    let columns: Vec<usize> =
+        free.iter().copied().chain(places.iter().copied().flatten()).collect();
+    let mut triangle = Triangle::of_rows(&jacobian.select_columns(&columns), &residual);
+    let prior = |&column: &usize| {
         let k = whole.unknowns[column];
         let precision = parameters[k].sigma.map_or(0.0, |sigma| sigma.powi(-2));
-        normal[(j, j)] += precision + RIDGE * normal[(j, j)] + f64::MIN_POSITIVE;
-        gradient[j] += precision * x[k];
-    }
-    let factor = normal.cholesky()?;
-    let step = factor.solve(&gradient);
-    let noise = fit.noise_factor;
-    let misfit = residual.norm_squared() * (1.0 - noise.recip());
-    let gain = |(index, name): (usize, &String)| {
-        let k = parameters.iter().position(|parameter| parameter.name == *name)?;
-        let column = jacobian.column(place(k)?);
-        let with_free = columns.tr_mul(&column);
-        let before = column.norm_squared();
-        let after = before - with_free.dot(&factor.solve(&with_free));
-        let slope = column.dot(&residual) - with_free.dot(&step);
+        let ridge = RIDGE * jacobian.column(column).norm_squared() + f64::MIN_POSITIVE;
+        let root = (precision + ridge).sqrt();
+        (root, precision * x[k] / root)
+    };
+    triangle.absorb_diagonal(&free.iter().map(prior).collect::<Vec<(f64, f64)>>());
+    let Linearisation { triangle, projected, .. } = triangle.into_linearisation();
+    let misfit = residual.norm_squared() * (1.0 - fit.noise_factor.recip());
+    let beyond_free = projected.rows_range(free.len()..);
+    let gain = |(column, (index, place)): (usize, (usize, usize))| {
+        let own = triangle.column(free.len() + column);
+        let own = own.rows_range(free.len()..);
+        let (before, after) = (jacobian.column(place).norm_squared(), own.norm_squared());
+        let slope = own.dot(&beyond_free);
         (after > MIN_OWN_SHARE * before).then(|| (index, slope * slope / after / misfit))
     };
-    Some(held.iter().enumerate().filter_map(gain).collect())
+    let placed = places.iter().enumerate().filter_map(|(index, place)| Some((index, (*place)?)));
+    placed.enumerate().filter_map(gain).collect()
 }

@@ -28,6 +28,8 @@ use crate::quantity::Unit;
 const MAX_SWEEPS: usize = 500;
 /// Relative reduction of the cost in one sweep at which a sequential strategy counts as converged.
 const SWEEP_TOLERANCE: f64 = 1e-7;
+/// Number of parameters of the set-up from which they come first among the unknowns.
+const MANY_PLACEMENTS: usize = 128;
 /// Maximum number of solver steps of each stage in a repeated sweep. More would be wasted, because
 /// the next stage moves the optimum.
 const MAX_SWEEP_STEPS: u64 = 2;
@@ -125,12 +127,18 @@ impl From<StageEnd> for FitEnd {
 impl<'a> Fitting<'a> {
     /// Returns the indices of the parameters for which `choose` returns true, except those of
     /// bases, targets and fixtures that only held-out rows use.
+    ///
+    /// Many parameters of the set-up come first. Each row involves few of them, and so does then
+    /// each row of the triangular factor.
     fn choose(&self, choose: impl Fn(&Parameter) -> bool) -> Vec<usize> {
-        let numbered = self.model.parameters.iter().enumerate();
-        numbered
-            .filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter))
-            .map(|(k, _)| k)
-            .collect()
+        let parameters = &self.model.parameters;
+        let is_chosen = |&k: &usize| !self.held_out_only.parameters[k] && choose(&parameters[k]);
+        let of_arm = |k: &usize| !parameters[*k].site.is_placement();
+        let mut chosen: Vec<usize> = (0..parameters.len()).filter(is_chosen).collect();
+        if chosen.iter().filter(|k| !of_arm(k)).count() >= MANY_PLACEMENTS {
+            chosen.sort_by_key(of_arm);
+        }
+        chosen
     }
 
     /// Returns the indices of the parameters of the set-up that the identification rows use: bases,

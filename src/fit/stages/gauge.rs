@@ -74,6 +74,27 @@ impl Gauge {
     }
 }
 
+/// Returns combinations of unknowns for the unknowns in another order: unknown j of the result is
+/// `order[j]`. The first weight of a combination is positive.
+pub(in crate::fit) fn in_order(
+    combinations: &[UnidentifiableCombination],
+    order: &[usize],
+) -> Vec<UnidentifiableCombination> {
+    let mut place = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(j, &k)| place[k] = j);
+    let renumbered = |combination: &UnidentifiableCombination| {
+        let moved = combination.weights.iter().map(|&(k, weight)| (place[k], weight));
+        let mut weights: Vec<(usize, f64)> = moved.collect();
+        weights.sort_by_key(|&(j, _)| j);
+        let sign = weights.first().map_or(1.0, |(_, weight)| weight.signum());
+        for (_, weight) in &mut weights {
+            *weight *= sign;
+        }
+        UnidentifiableCombination { weights, ..*combination }
+    };
+    combinations.iter().map(renumbered).collect()
+}
+
 /// Returns the triangular factor of `triangle` with `rows` appended below.
 pub(super) fn factor_of_stacked(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
     let n = triangle.ncols();

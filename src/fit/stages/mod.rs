@@ -9,7 +9,7 @@ pub(super) mod custom_solver;
 pub(super) mod earlier_data;
 pub(super) mod fitting;
 pub(super) mod fixture_location;
-mod gauge;
+pub(super) mod gauge;
 mod marker_pose;
 pub(super) mod noise_model;
 pub(super) mod parameter_size;

@@ -129,6 +129,13 @@ impl<'a> Stage<'a> {
         self.unknowns.iter().map(|&k| &self.model.parameters[k])
     }
 
+    /// Returns the places of the unknowns in the order of the parameters of the model.
+    pub fn model_order(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.unknowns.len()).collect();
+        order.sort_by_key(|&place| self.unknowns[place]);
+        order
+    }
+
     /// Returns the prior σ of each unknown; `None` without a prior.
     pub fn prior_sigmas(&self) -> Vec<Option<f64>> {
         self.parameters().map(|parameter| parameter.sigma).collect()

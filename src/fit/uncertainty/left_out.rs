@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::fit::stages::fitting::Fitting;
-use crate::least_squares::jacobian_and_residual;
+use crate::least_squares::{Triangle, jacobian_and_residual};
 use crate::numeric::parallel;
 
-/// Ridge on the diagonal of the normal matrix, as a fraction of the entry there. Combinations that
+/// Ridge on the diagonal of JᵀJ + Λ, as a fraction of the entry of JᵀJ there. Combinations that
 /// only one configuration determines then keep their fitted values if that one is left out.
 const RIDGE: f64 = 1e-9;
 
@@ -40,14 +40,16 @@ impl Fitting<'_> {
             jacobian.rows_mut(per_pose * place, per_pose).scale_mut(*weight);
             residual.rows_mut(per_pose * place, per_pose).scale_mut(*weight);
         }
-        let mut normal = jacobian.tr_mul(&jacobian);
-        for (j, &k) in unknowns.iter().enumerate() {
+        let mut triangle = Triangle::of_rows(&jacobian, &residual);
+        let prior = |(j, &k): (usize, &usize)| {
             let precision = self.model.parameters[k].sigma.map_or(0.0, |sigma| sigma.powi(-2));
-            normal[(j, j)] += precision + RIDGE * normal[(j, j)] + f64::MIN_POSITIVE;
-        }
+            let ridge = RIDGE * jacobian.column(j).norm_squared() + f64::MIN_POSITIVE;
+            ((precision + ridge).sqrt(), 0.0)
+        };
+        triangle.absorb_diagonal(&unknowns.iter().enumerate().map(prior).collect::<Vec<_>>());
         if let Some(earlier) = self.earlier {
-            let rows = earlier.on(self.model, unknowns, x).matrix;
-            normal += rows.tr_mul(&rows);
+            let rows = earlier.on(self.model, unknowns, x);
+            triangle.merge(&Triangle::of_rows(&rows.matrix, &rows.constant));
         }
         let mut groups: Vec<Vec<usize>> = Vec::new();
         let mut group_of = std::collections::BTreeMap::new();
@@ -58,17 +60,15 @@ impl Fitting<'_> {
             });
             groups[group].push(place);
         }
-        let factor = normal.cholesky();
         let of_group = |places: &Vec<usize>| -> Vec<(usize, Vector3<f64>)> {
             let lines: Vec<usize> =
                 places.iter().flat_map(|place| per_pose * place..per_pose * (place + 1)).collect();
             let mut left = residual.select_rows(&lines);
-            if let Some(factor) = &factor {
-                let columns = jacobian.select_rows(&lines);
-                let hat = &columns * factor.solve(&columns.transpose());
-                let matrix = DMatrix::identity(lines.len(), lines.len()) * (1.0 + RIDGE) - hat;
-                left = matrix.cholesky().map_or(left.clone(), |matrix| matrix.solve(&left));
-            }
+            let mut whitened = jacobian.select_rows(&lines).transpose();
+            whitened.column_iter_mut().for_each(|column| triangle.solve_transposed(column));
+            let hat = whitened.tr_mul(&whitened);
+            let matrix = DMatrix::identity(lines.len(), lines.len()) * (1.0 + RIDGE) - hat;
+            left = matrix.cholesky().map_or(left.clone(), |matrix| matrix.solve(&left));
             let error = |(k, &place): (usize, &usize)| {
                 let whitened = left.fixed_rows::<3>(per_pose * k).into_owned();
                 (place, whitened * stage.poses[place].sigma / weights[place].max(f64::MIN_POSITIVE))

@@ -3,6 +3,7 @@
 use super::arm::{Arm, Poses};
 use super::pose::sample;
 use crate::fit::Identification;
+use crate::model::parameter::ParameterSite;
 use crate::problem::Problem;
 
 /// Maximum number of poses over which contributions are averaged.
@@ -32,23 +33,32 @@ pub fn of(
 ) -> Vec<Contribution> {
     let rows = sample(rows, MAX_AVERAGED_POSES, |_| 0.0);
     let errors = poses.errors(arm, &rows);
+    let parameters = &arm.model.parameters;
+    let setups = poses.placement.poses(poses.measurements, &rows, 1.0);
     let moved = |indices: &[usize]| {
         let mut without = arm.clone();
         for &k in indices {
             without.x[k] = identification.registered_x[k];
         }
-        let changes = poses
-            .errors(&without, &rows)
-            .into_iter()
-            .zip(&errors)
-            .map(|(without, errors)| without - errors);
+        // A base or a target moves the positions of its own rows alone.
+        let is_moved = |place: usize| match indices.iter().map(|&k| parameters[k].site).next() {
+            Some(ParameterSite::Base { base, .. }) => setups[place].base == base,
+            Some(ParameterSite::Target { target, .. }) => setups[place].target == target,
+            _ => true,
+        };
+        let places: Vec<usize> = (0..rows.len()).filter(|&place| is_moved(place)).collect();
+        let moved_rows: Vec<usize> = places.iter().map(|&place| rows[place]).collect();
+        let mut changes: Vec<_> = errors.iter().map(|error| error * 0.0).collect();
+        for (place, without) in places.into_iter().zip(poses.errors(&without, &moved_rows)) {
+            changes[place] = without - errors[place];
+        }
         let squares: Vec<f64> = changes
-            .map(|change| change.norm_squared())
+            .iter()
+            .map(nalgebra::Matrix::norm_squared)
             .filter(|square| square.is_finite())
             .collect();
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     };
-    let parameters = &arm.model.parameters;
     let mut remaining: Vec<usize> = (0..parameters.len()).collect();
     let mut contributions = Vec::new();
     for effect in problem.effects.iter().map(|declared| &declared.effect) {
