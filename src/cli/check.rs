@@ -65,6 +65,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         CheckedPoses::Table { poses, .. } => Common::orientation_line(&problem, poses),
         CheckedPoses::Drawn(..) => "",
     };
+    if let CheckedPoses::Table { poses, .. } = &poses {
+        common.hint(poses.still_joints().into_iter().map(|joint| {
+            format!(
+                "joint {} stands still in all poses, so that they do not tell what its other \
+                 coordinates would show; vary it",
+                joint + 1
+            )
+        }));
+    }
     let check = design::check(&problem, &poses, arguments.source.seed)?;
     let json = CheckResult::new(&problem, &check).to_json();
     let story = report::check(&problem, &check);

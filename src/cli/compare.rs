@@ -44,7 +44,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.print_result(&json, || {
         let text = report::compare_text(&problem, &comparison);
         let lacks = exceeds_noise(&comparison.joint);
-        let (command, what) = if lacks {
+        let (command, what) = if !comparison.joint.is_trusted() {
+            ("identify", "says what to correct")
+        } else if lacks {
             ("loop", "looks for what the model lacks")
         } else {
             ("identify", "writes the estimate of the joint fit")

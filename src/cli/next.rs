@@ -241,6 +241,9 @@ fn next_step(
     let common = &asked.common;
     let arguments = common.problem_arguments();
     let flags = asked.flags();
+    if !next.found.is_trusted() && next.stop.is_none() {
+        return format!("flexcal identify {arguments} says what to correct");
+    }
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
     let lacks = if next.has_large_misfit() && !noise_exceeds {

@@ -100,7 +100,11 @@ pub enum InputErrorKind {
     NotWhole { value: String, least: u64 },
     #[error("{value} is too large; at most {most}")]
     TooLarge { value: u64, most: u64 },
-    #[error("a vector has 3 numbers, found {found}{}", decimal_comma_hint(*has_close_commas))]
+    #[error(
+        "a vector has 3 numbers, found {found}{}{}",
+        if *found == 4 && !has_close_commas { " (rotations are rotation vectors, not quaternions)" } else { "" },
+        decimal_comma_hint(*has_close_commas)
+    )]
     NotAVector { found: usize, has_close_commas: bool },
     #[error("expected 2 numbers, found {found}{}", decimal_comma_hint(*has_close_commas))]
     NotAPair { found: usize, has_close_commas: bool },
@@ -428,6 +432,8 @@ pub enum InputErrorKind {
     SoftJoint { joint: String, moment: String, angle: String },
 
     // The following errors concern the truth of a simulation.
+    #[error("as large as the nominal value; write the deviation from nominal, not the value")]
+    AbsoluteDeviation,
     #[error(
         "a range has two numbers, the lower one first; for a fixed value write [{value}, {value}]"
     )]
@@ -468,13 +474,6 @@ pub enum InputErrorKind {
     NoIdentificationRows { cause: NoRows },
     #[error("no rows are held out: {cause}")]
     NoHeldOutRows { cause: NoRows },
-    #[error(
-        "no held-out row measures a position, and pose accuracy is of positions: hold out rows \
-         with x_mm, y_mm and z_mm, measured by \
-         whatever is to judge the arm; identify reports the errors of \
-         points in images, contacts, distances and tilts"
-    )]
-    NoPositionsHeldOut,
     #[error(
         "no session is called \"{session}\"; there {}",
         joined_list("is", sessions, "is no column session")

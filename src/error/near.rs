@@ -72,6 +72,11 @@ pub(super) fn pattern_suggestion(pattern: &str, known: &[String]) -> String {
     if pattern.starts_with("joint[") || pattern.contains(EXPRESSION_CHARACTERS) {
         return " (only * stands for other text: write a rule for each joint)".to_owned();
     }
+    if let Some(joint) = pattern.strip_suffix(".stiffness")
+        && known.iter().any(|name| *name == format!("{joint}.alpha"))
+    {
+        return format!(" ({joint} declares no stiffness_N_m_per_rad: write it in its [[joint]])");
+    }
     suggestion(pattern, known)
 }
 

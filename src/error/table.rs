@@ -101,6 +101,23 @@ pub enum TableErrorKind {
         pair[0], pair[1]
     )]
     NamesWrittenOtherwise { left: usize, rows: usize, pair: [String; 2] },
+    #[error(
+        "no held-out row measures a position, and pose accuracy is of positions: hold out rows \
+         with x_mm, y_mm and z_mm, measured by \
+         whatever is to judge the arm; identify reports the errors of \
+         points in images, contacts, distances and tilts"
+    )]
+    NoPositionsHeldOut,
+    #[error(
+        "held_out = \"none\" holds out no pose that could judge the arm; write held_out = {{ fraction \
+         = 0.3, seed = 1 }}"
+    )]
+    NothingHeldOut,
+    #[error(
+        "every held-out pose is fitted too, so that they judge nothing; hold out other poses, as \
+         held_out = {{ fraction = 0.3, seed = 1 }} does"
+    )]
+    HeldOutFitted,
     #[error("no rows below the header")]
     NoRowsBelowHeader,
     #[error(

@@ -176,6 +176,11 @@ pub enum WarningKind {
          time_s means seconds"
     )]
     LooksLikeMilliseconds { value: String },
+    #[error(
+        "the rows are typically {step} s apart; if these are milliseconds, divide the times by 1000, \
+         because time_s means seconds"
+    )]
+    LongSteps { step: String },
     #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
     Kelvins { least: String },
     #[error(

@@ -36,7 +36,8 @@ pub enum ExportError {
     },
     /// Too few of the poses drawn are inside the workspace.
     #[error(
-        "{found} of {draws} poses within the joint limits are inside of the workspace; widen it"
+        "{found} of {draws} poses within the joint limits are inside of the workspace; widen it, or \
+         multiply the numbers of --workspace-mm by 1000 if they are metres"
     )]
     Unreachable {
         /// Number of poses inside the workspace.

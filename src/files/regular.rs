@@ -36,9 +36,9 @@ pub(super) fn open(path: &Path) -> io::Result<File> {
         let names = names_in(path);
         let listed = names.get(..MAX_LISTED_NAMES).unwrap_or(&names).join(", ");
         let message = if names.is_empty() {
-            "it is a folder without files; give a file".to_owned()
+            "it is a folder; give a regular file".to_owned()
         } else {
-            format!("it is a folder; give a file in it, such as {listed}")
+            format!("it is a folder; give a regular file in it, such as {listed}")
         };
         return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
     }

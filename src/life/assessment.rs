@@ -118,6 +118,10 @@ pub(super) fn assess(
     causes: &[Cause],
     is_sequential: bool,
 ) -> Option<Assessment> {
+    // Poses without an equilibrium have no residual.
+    if rows.residual.iter().any(|residual| !residual.is_finite()) {
+        return None;
+    }
     let columns = rows.sensitivity.ncols();
     let mut sums = Sums::new(columns, 1.0);
     let of_ratios = |ratios: &[f64]| -> SumsByRatio {

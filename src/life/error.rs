@@ -52,7 +52,10 @@ pub enum PriorError {
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error("{}: {name} is part of the prior, but not free in the problem", file.display())]
     NotFree { file: PathBuf, name: String },
-    #[error("{}: the arm it describes has no prediction in some pose of the table", file.display())]
+    #[error(
+        "{}: the arm it describes has no prediction in some pose of the table; check the loads there, such as payload_kg",
+        file.display()
+    )]
     NotFinite { file: PathBuf },
     #[error(
         "{}: neither it nor the problem states σ of a measured position; declare position_sigma_mm in [data], or a column sigma_mm",

@@ -36,6 +36,10 @@ const MAX_PAYLOAD_RATIO: f64 = 10.0;
 const MAX_REPEAT_DISTANCE: f64 = 0.02;
 /// Minimum number of rows in a table at which a separate session for each row is implausible.
 const MIN_SESSION_ROWS: usize = 10;
+/// Largest usual time between two rows \[s\]: some hours.
+const MAX_USUAL_STEP: f64 = 2e4;
+/// Smallest time of a date \[s\], counted from 1970: in 2001.
+const MIN_DATE: f64 = 1e9;
 /// Largest plausible time \[s\], counted from 1970. Later times are in the year 5138, whereas
 /// milliseconds since 1970 exceed this limit from 1973 on.
 const MAX_PLAUSIBLE_TIME: f64 = 1e11;
@@ -185,13 +189,24 @@ impl Measurements {
             .then(|| self.warning(0, "session", kind))
     }
 
-    /// Returns a warning, located at the first row, if all times are so large that they are
-    /// probably in milliseconds.
+    /// Returns a warning, located at the first row, if all times, or the usual times between rows,
+    /// are so large that they are probably in milliseconds.
     pub(super) fn milliseconds(&self) -> Option<Warning> {
         let first = *self.time.first().filter(|_| self.time_measured)?;
         let is_late = self.time.iter().all(|time| *time > MAX_PLAUSIBLE_TIME);
         let kind = WarningKind::LooksLikeMilliseconds { value: format!("{first}") };
-        is_late.then(|| self.warning(0, "time", kind))
+        if is_late {
+            return Some(self.warning(0, "time", kind));
+        }
+        let pairs = self.time.iter().zip(self.time.iter().skip(1));
+        let mut steps: Vec<f64> = pairs.map(|(one, other)| (other - one).abs()).collect();
+        steps.sort_by(f64::total_cmp);
+        let step = *steps.get(steps.len() / 2).filter(|step| **step > MAX_USUAL_STEP)?;
+        // Dates are read as seconds, and are not mistaken for milliseconds.
+        (first < MIN_DATE).then(|| {
+            let kind = WarningKind::LongSteps { step: number(step, 0) };
+            self.warning(0, "time", kind)
+        })
     }
 
     /// Returns a warning, located at the largest angle, if a column in radians exceeds
@@ -217,6 +232,18 @@ impl Measurements {
         };
         (turns > MIN_SUSPICIOUS_TURNS)
             .then(|| self.warning(row, format!("joint {}", column.joint + 1), kind))
+    }
+
+    /// Returns the indices of the joints whose coordinate is the same in all rows, which are at least
+    /// two.
+    #[doc(hidden)]
+    pub fn still_joints(&self) -> Vec<usize> {
+        let is_still = |joint: &usize| {
+            let mut values = (0..self.len()).map(|row| self.configuration(row)[*joint]);
+            let first = values.next();
+            self.len() > 1 && values.all(|value| Some(value) == first)
+        };
+        (0..self.joints).filter(is_still).collect()
     }
 
     /// Returns a warning for each joint that is commanded beyond its declared range, located at the

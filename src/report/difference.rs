@@ -295,6 +295,13 @@ fn notes([a, b]: [&SavedEstimate; 2], shared: usize) -> Vec<String> {
             counted(shared, "common row")
         ));
     }
+    if a.strategy != b.strategy {
+        let [of_a, of_b] = [a, b].map(|estimate| estimate.strategy.as_str());
+        notes.push(format!(
+            "A was fitted with strategy {of_a}, B with strategy {of_b}: the parameters differ for \
+             that reason alone."
+        ));
+    }
     for (name, estimate) in [("A", a), ("B", b)] {
         if !estimate.trusted {
             notes.push(format!("The fit of {name} was not trusted; see its findings."));

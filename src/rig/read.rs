@@ -255,8 +255,15 @@ fn deviation(
     if parameter.unit.is_relative() && value <= 0.0 {
         return Err(item.error(InputErrorKind::NotPositive { value }));
     }
+    let is_nominal = (value - parameter.nominal).abs() <= ROUNDING * parameter.nominal.abs();
+    if !parameter.unit.is_relative() && value != 0.0 && is_nominal {
+        return Err(item.error(InputErrorKind::AbsoluteDeviation));
+    }
     Ok(Deviation { name: name.to_owned(), value })
 }
+
+/// Largest relative difference of two equal numbers.
+const ROUNDING: f64 = 1e-9;
 
 /// Reads a rule for random values, for example `"joint*.alpha" = { sigma_deg = 0.3 }`.
 fn random(

@@ -11,6 +11,9 @@ const MAX_PLAUSIBLE_ANGLE: f64 = TAU + 0.01;
 /// one.
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 
+/// Maximum plausible mass of a link \[kg\].
+const MAX_PLAUSIBLE_MASS: f64 = 1000.0;
+
 /// Returns the notes about a chain and about joints outside it.
 pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
     let joints: Vec<&Joint> =
@@ -20,6 +23,7 @@ pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
     notes.extend(joints.iter().filter_map(|joint| angle_in_degrees(joint)));
     notes.extend(joints.iter().filter_map(|joint| length_in_millimetres(joint)));
     notes.extend(limits_in_degrees(&joints));
+    notes.extend(mass_in_grams(chain));
     notes.extend(joints.iter().filter_map(|joint| unlimited_slide(joint)));
     let beside =
         chain.robot.joints.iter().enumerate().filter(|(index, _)| !chain.joints.contains(index));
@@ -64,6 +68,18 @@ fn angle_in_degrees(joint: &Joint) -> Option<String> {
          and run init again",
         joint.name
     ))
+}
+
+/// Returns a note about the heaviest link if it is too heavy for an arm.
+fn mass_in_grams(chain: &Chain) -> Option<String> {
+    let heaviest = chain.robot.links.iter().max_by(|a, b| a.mass.total_cmp(&b.mass))?;
+    (heaviest.mass > MAX_PLAUSIBLE_MASS).then(|| {
+        format!(
+            "{}: mass holds {} kg; if the URDF has grams there, convert them to kilograms and run \
+             init again",
+            heaviest.name, heaviest.mass
+        )
+    })
 }
 
 /// Returns a note if an origin is implausibly far from the previous one, so that it is probably in

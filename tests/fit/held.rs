@@ -2,6 +2,8 @@
 
 use flexcal::fit::FindingCode;
 
+use nalgebra::{Rotation3, Vector3};
+
 use crate::common::arms::parse;
 use crate::common::made::fit_as_command;
 use crate::judged::{PRIORS, measured, text};
@@ -30,6 +32,19 @@ fn a_held_parameter_that_causes_the_misfit_is_named() {
     let many = holding(&["joint*.*"]);
     assert!(many.has(FindingCode::NoiseBeyondDeclared), "{:?}", many.findings);
     assert!(!many.has(FindingCode::HeldParameter), "{:?}", many.findings);
+}
+
+#[test]
+fn a_held_base_that_moved_in_several_ways_is_named() {
+    let problem = parse(&text("'joint3.a' = { sigma_mm = 1 }"));
+    let mut moved = measured(&problem, 2);
+    let turn = Rotation3::new(Vector3::new(6e-3, -4e-3, 5e-3));
+    let shift = Vector3::new(5e-3, -6e-3, 4e-3);
+    moved.measurements.positions.iter_mut().for_each(|at| *at = turn * *at + shift);
+    let found = fit_as_command(&problem, &moved);
+    let finding = found.finding(FindingCode::HeldParameter);
+    let words = finding.unwrap_or_else(|| panic!("{:?}", found.findings)).to_string();
+    assert!(words.contains("base.* is held") && words.contains("= { free = true }"), "{words}");
 }
 
 #[test]

@@ -228,6 +228,13 @@ fn other_units_and_broken_followers_are_noted() {
              <joint name=\"g\" type=\"prismatic\"><parent link=\"a\"/><child link=\"f\"/>{beside}</joint></robot>"
         )
     };
+    let misspelt = arm("xyz=\"0.2 0 0\"", "").replace("\"continuous\"", "\"continous\"");
+    let robot = Robot::parse(&misspelt, Path::new("r.urdf"));
+    let chain = robot.and_then(|robot| Chain::new(&robot, None, Some("c")).map(|_| ()));
+    assert!(chain.unwrap_err().to_string().contains("did you mean continuous?"));
+    let robot = Robot::parse(&arm("xyz=\"0.2 0 0\"", ""), Path::new("r.urdf")).unwrap();
+    let exchanged = Chain::new(&robot, Some("c"), Some("a")).err().unwrap().to_string();
+    assert!(exchanged.contains("exchange --base and --tip"), "{exchanged}");
     let notes = |origin: &str, beside: &str| {
         let robot = Robot::parse(&arm(origin, beside), Path::new("r.urdf")).unwrap();
         describe(&Chain::new(&robot, None, Some("c")).unwrap()).unwrap().notes.join("\n")

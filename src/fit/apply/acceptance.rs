@@ -1,11 +1,11 @@
 //! Acceptance of an identified arm: pose accuracy and repeatability in held-out poses, as ISO 9283
 //! defines them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use nalgebra::Vector3;
 
-use crate::error::InputErrorKind;
+use crate::error::TableErrorKind;
 use crate::fit::IdentifyError;
 use crate::fit::apply::predict::Residual;
 use crate::fit::apply::tolerance::{Tolerance, ToleranceTest, Verdict};
@@ -13,7 +13,7 @@ use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::Dataset;
 use crate::numeric::{Interval, mean_interval};
-use crate::problem::Problem;
+use crate::problem::{HeldOut, Problem};
 
 /// Number of bootstrap resamples of a confidence interval.
 const RESAMPLES: usize = 5000;
@@ -102,15 +102,24 @@ impl Accuracy {
 /// pose accuracy.
 ///
 /// # Errors
-/// Returns an error if there are none.
+/// Returns an error if there are none, or if all are of poses that are fitted too.
 pub fn held_out_positions(
     problem: &Problem,
     Dataset { measurements, split }: &Dataset,
 ) -> Result<Vec<usize>, IdentifyError> {
     let is_position = |row: &usize| measurements.observation(*row).is_position();
     let rows: Vec<usize> = split.held_out.iter().copied().filter(is_position).collect();
+    let error = |kind| Err(problem.data.held_out_location.clone().error(kind).into());
+    if problem.data.held_out == Some(HeldOut::Nothing) {
+        return error(TableErrorKind::NothingHeldOut);
+    }
     if rows.is_empty() {
-        return Err(problem.data.location.clone().error(InputErrorKind::NoPositionsHeldOut).into());
+        return Err(problem.data.location.clone().error(TableErrorKind::NoPositionsHeldOut).into());
+    }
+    let numbers = measurements.pose_numbers(problem);
+    let fitted: HashSet<usize> = split.identification.iter().map(|&row| numbers[row]).collect();
+    if rows.iter().all(|&row| fitted.contains(&numbers[row])) {
+        return error(TableErrorKind::HeldOutFitted);
     }
     Ok(rows)
 }

@@ -92,11 +92,23 @@ fn rounded(value: f64) -> f64 {
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum SavedEstimateError {
-    #[error("{}: no such file; flexcal identify PROBLEM writes an estimate.json, into the folder that it names", file.display())]
+    #[error(
+        "{}: no such file; {}",
+        file.display(),
+        if file.to_string_lossy().contains('*') {
+            "a pattern in quotes is not expanded: leave them out"
+        } else {
+            "flexcal identify PROBLEM writes an estimate.json, into the folder that it names"
+        }
+    )]
     NoSuchFile { file: PathBuf },
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable { file: PathBuf, source: io::Error },
-    #[error("{}: not an estimate.json: {source}", file.display())]
+    #[error(
+        "{}: not an estimate.json: {source}{}",
+        file.display(),
+        if source.is_eof() { "; the file is cut: copy it again" } else { "" }
+    )]
     Syntax { file: PathBuf, source: serde_json::Error },
     #[error("{}: format: a file of {name}, not an estimate.json; flexcal identify writes one", file.display())]
     OtherFormat { file: PathBuf, name: String },

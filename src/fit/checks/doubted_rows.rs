@@ -86,6 +86,10 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     for _ in 0..PASSES {
         trial = registered(&trial.near)?;
     }
+    // Fewer rows than those of a trial do not tell the arm from others.
+    if trial.near.len() < WINDOW {
+        return None;
+    }
     let apart: Vec<usize> = (0..rows.len()).filter(|row| !trial.near.contains(row)).collect();
     let squares = trial.near.iter().map(|&place| trial.errors[place].norm_squared());
     let after = (squares.sum::<f64>() / trial.near.len().max(1) as f64).sqrt();

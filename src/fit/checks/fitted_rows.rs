@@ -67,8 +67,14 @@ impl Identification {
             // That finding says also what is wrong in the rows.
             let has_doubted_rows =
                 findings.iter().any(|finding| finding.code == FindingCode::RowsDoubted);
+            // Another reading of the whole table explains many rows better.
+            let has_readings = |finding: &Finding| {
+                rows.len() > MAX_NAMED
+                    && finding.value("explanations").is_some_and(|of| of != &json!([]))
+            };
+            let is_read_otherwise = findings.iter().any(has_readings);
             for finding in &mut findings {
-                if OF_MISFIT.contains(&finding.code) && !has_doubted_rows {
+                if OF_MISFIT.contains(&finding.code) && !has_doubted_rows && !is_read_otherwise {
                     *finding = finding.clone().with_remedy(remedy.clone());
                 }
             }

@@ -1,9 +1,12 @@
 //! Checks of the size of the residual: a very large one indicates data of another arm or wrong
 //! units.
 
+use nalgebra::Vector3;
+
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::row_kind::{RowKind, format_error, quantity_noun, spread, suspects};
+use crate::problem::Observation;
 
 /// Largest rms residual of a fit, relative to the spread of the measurements, that is not reported
 /// as a misfit.
@@ -22,6 +25,18 @@ const MIN_REPORTED_ERROR: f64 = 1000.0;
 const MIN_OTHER_ARM_MISS: f64 = 0.5;
 /// Largest ratio between the spreads of measured and predicted points that is not reported.
 const MAX_SIZE_RATIO: f64 = 2.0;
+/// Ratios of the spread of the nominal arm's points to that of the measured ones, with the units that
+/// give them.
+const SIZES_OF_UNITS: [(f64, &str); 6] = [
+    (1e3, "the positions are probably in metres, declared as millimetres"),
+    (1e-3, "the positions are probably in millimetres, declared as metres"),
+    (25.4, "the positions are probably in inches, declared as millimetres"),
+    (10.0, "the positions are probably in centimetres, declared as millimetres"),
+    (0.1, "the positions are probably in tenths of a millimetre"),
+    (0.01, "the positions are probably in hundredths of a millimetre"),
+];
+/// Largest deviation of such a ratio from that of two units: its logarithm.
+const MAX_OFF_UNIT: f64 = 0.4;
 /// Smallest spread of points from which the size of an arm is judged \[m\], or of tilts from which
 /// rotations are judged \[rad\].
 pub(super) const MIN_SPREAD: f64 = 0.01;
@@ -43,12 +58,56 @@ impl Check for Misfit {
             let counts = |_: &Finding| {
                 fit.end.termination.converged() || misfit_finding(&kind, nominal).is_some()
             };
-            misfit_finding(&kind, fitted)
+            let finding = misfit_finding(&kind, fitted)
                 .filter(counts)
-                .or_else(|| no_better_finding(&kind, nominal, fitted))
+                .or_else(|| no_better_finding(&kind, nominal, fitted))?;
+            Some(match reading_of_tilts(fit, &kind, fitted) {
+                Some(words) => finding.with_remedy(format!("the tilts fit with {words}")),
+                None => finding,
+            })
         };
         fit.kinds().into_iter().filter_map(of_kind).collect()
     }
+}
+
+/// Function from the two numbers of a measured tilt \[rad\] to those that another reading means.
+type TiltReading = fn(&Vector3<f64>) -> [f64; 2];
+
+/// Other readings of the two columns of tilts.
+const TILT_READINGS: [(&str, TiltReading); 5] = [
+    ("tilt_x of the other sign", |tilt| [-tilt.x, tilt.y]),
+    ("tilt_y of the other sign", |tilt| [tilt.x, -tilt.y]),
+    ("tilt_x and tilt_y of the other sign", |tilt| [-tilt.x, -tilt.y]),
+    ("tilt_x and tilt_y exchanged", |tilt| [tilt.y, tilt.x]),
+    ("numbers in mm/m, which are no degrees: write atan(number / 1000)", |tilt| {
+        [tilt.x, tilt.y].map(|angle| (angle.to_degrees() * 1e-3).atan())
+    }),
+];
+/// Largest ratio of the error of tilts with another reading to that as read, at which the reading is
+/// named.
+const MAX_READ_RATIO: f64 = 0.1;
+
+/// Returns the words of the reading of tilts with which the fitted or the nominal arm misses them
+/// far less than by `rms` \[rad\]; `None` for other kinds of rows, or if there is no such reading.
+fn reading_of_tilts(fit: &CheckedFit, kind: &RowKind, rms: f64) -> Option<&'static str> {
+    if kind.observation.kind() != Observation::Tilt(0).kind() {
+        return None;
+    }
+    let measured = &fit.fitting.measurements.positions;
+    let errors = [&fit.end.x, fit.registered_x].map(|x| fit.fitting.position_errors(&kind.rows, x));
+    let error = |reading: TiltReading| {
+        let of_arm = errors.iter().map(|errors| {
+            let squares = kind.rows.iter().zip(errors).map(|(&row, error)| {
+                let (read, predicted) = (reading(&measured[row]), measured[row] - error);
+                (read[0] - predicted.x).powi(2) + (read[1] - predicted.y).powi(2)
+            });
+            (squares.sum::<f64>() / kind.rows.len() as f64).sqrt()
+        });
+        of_arm.fold(f64::INFINITY, f64::min)
+    };
+    let readings = TILT_READINGS.into_iter().map(|(words, reading)| (words, error(reading)));
+    let (words, best) = readings.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (best < MAX_READ_RATIO * rms).then_some(words)
 }
 
 /// Checks that the measured positions spread over a workspace of the nominal arm's size.
@@ -141,7 +200,15 @@ fn other_size_finding(measured: f64, expected: f64) -> Option<Finding> {
         expected * 1e3
     );
     let numbers = [measured.into(), expected.into()];
-    Some(Finding::new(FindingCode::OtherSize, numbers, text))
+    let finding = Finding::new(FindingCode::OtherSize, numbers, text);
+    let ratio = (expected / measured).ln();
+    let unit = SIZES_OF_UNITS.iter().find(|(factor, _)| (ratio - factor.ln()).abs() < MAX_OFF_UNIT);
+    Some(match unit {
+        Some((_, words)) => {
+            finding.with_remedy(format!("{words}; otherwise check what the columns hold"))
+        }
+        None => finding,
+    })
 }
 
 #[cfg(test)]

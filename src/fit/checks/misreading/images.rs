@@ -9,10 +9,12 @@ use crate::problem::{Fixture, Observation, Problem};
 
 /// Returns the misreadings of images: exchanged or reversed axes, the numbering of the points,
 /// images that are shifted against the configurations, and other carriers of cameras and markers.
-pub(super) fn of_images(problem: &Problem) -> Vec<Misreading> {
+pub(super) fn of_images(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
+    let is_first = |row| matches!(table.observation(row), Observation::Pixel(.., 0));
+    let from_one = (!(0..table.len()).any(is_first)).then_some(Misreading::FromOne);
     let shifts = [-1, 1].map(|by| Misreading::ShiftedViews { by });
     let axes = [Misreading::ExchangedAxes, Misreading::FromBottom, Misreading::Transposed];
-    let mut misreadings: Vec<Misreading> = axes.into_iter().chain(shifts).collect();
+    let mut misreadings: Vec<Misreading> = axes.into_iter().chain(shifts).chain(from_one).collect();
     let of_kind = |wanted: FixtureKind| {
         let fixtures = problem.fixtures.iter().enumerate();
         fixtures.filter(move |(_, fixture)| fixture.kind == wanted)
@@ -40,6 +42,9 @@ impl Misreading {
             let Observation::Pixel(camera, marker, point) = *observation else { continue };
             match self {
                 Self::ExchangedAxes => pixel.swap_rows(0, 1),
+                Self::FromOne => {
+                    *observation = Observation::Pixel(camera, marker, point.saturating_sub(1));
+                }
                 Self::FromBottom => {
                     if let Some(height) = image_height(problem, camera as usize) {
                         pixel.y = height - pixel.y;

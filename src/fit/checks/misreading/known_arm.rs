@@ -4,7 +4,8 @@ use nalgebra::DVector;
 
 use super::Misreading;
 use super::candidates::candidates;
-use super::search::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_RATIO_TO_BEST, MAX_REVERSED};
+use super::reversed::MAX_REVERSED;
+use super::search::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_RATIO_TO_BEST};
 use crate::fit::Placement;
 use crate::measurement::Measurements;
 use crate::model::Model;

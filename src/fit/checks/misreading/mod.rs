@@ -12,6 +12,7 @@ mod explanation;
 mod images;
 mod known_arm;
 mod masses;
+mod reversed;
 mod search;
 mod target;
 mod undo;
@@ -288,6 +289,8 @@ pub enum Misreading {
     FromBottom,
     /// The points of a marker, which form a grid, are numbered column by column.
     Transposed,
+    /// The points of a marker are numbered from 1 instead of 0.
+    FromOne,
     /// Images belong to the configuration of another view.
     ShiftedViews {
         /// Number of views by which an image comes too late.

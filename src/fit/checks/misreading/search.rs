@@ -15,6 +15,7 @@ use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::common_scale::MIN_SCALE_ERROR;
 use crate::fit::checks::nominal_error::is_nominal_far_off;
 use crate::fit::checks::parameter_limits::{MAX_PRIOR_SIGMAS, is_of_arm, prior_sigmas};
+use crate::fit::checks::row_kind::spread;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::{Placement, SolverChoice};
 use crate::least_squares::{LinearisationCache, Loss};
@@ -52,8 +53,9 @@ const MAX_REACHES_BEYOND_PRIORS: f64 = 5e-4;
 const MIN_RATIO_ERROR: f64 = 1e-3;
 /// Maximum number of identification rows, evenly spaced, to which misreadings are applied.
 const MAX_ROWS: usize = 120;
-/// Maximum number of moving joints of which every subset is tried as reversed.
-pub(super) const MAX_REVERSED: usize = 7;
+/// Largest error of the registered nominal arm with a misreading corrected, relative to the spread of
+/// the points, at which the points follow the arm.
+const MAX_PART_OF_SPREAD: f64 = 0.5;
 /// Maximum number of misreadings that are fitted in full: those with the smallest error of the
 /// registered nominal arm.
 const MAX_FITTED_MISREADINGS: usize = 12;
@@ -131,7 +133,7 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     };
     let mut tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
     if measurements.leading().kind() == Observation::Pixel(0, 0, 0).kind() {
-        tested.extend(of_images(fit.problem));
+        tested.extend(of_images(fit.problem, measurements));
     }
     let mirrored = Misreading::Mirrored { axes: None };
     if !fit.is_base_free() && tested.contains(&mirrored) {
@@ -231,7 +233,7 @@ impl<'a> Trial<'a> {
 
     /// Returns the misreadings that can be corrected, each with the rms error of the registered
     /// nominal arm after the correction \[m\].
-    fn registered_errors(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
+    pub(super) fn registered_errors(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
         let error =
             |&misreading: &Misreading| Some((misreading, self.outcome(misreading, false)?.rms));
         let errors = parallel::map_items(misreadings, error);
@@ -308,7 +310,14 @@ impl<'a> Trial<'a> {
                 let registered = fitting.registered_to(TRIAL_TOLERANCE).ok()?;
                 let rms = self.error(fitting, rows, &registered);
                 let outcome = Outcome { rms, size: None, left_out: None, is_within_priors: true };
-                return rms.is_finite().then_some(outcome);
+                // An arm that a misreading shrinks to a point misses points by their spread, which
+                // explains nothing, however small the spread is.
+                let points = &fitting.measurements.positions;
+                let spread = spread(fitting.placement, rows, |place| points[rows[place]]);
+                let is_followed = !fitting.measurements.leading().is_position()
+                    || misreading == (Misreading::Reversed { joints: 0 })
+                    || rms <= MAX_PART_OF_SPREAD * spread;
+                return (rms.is_finite() && is_followed).then_some(outcome);
             }
             let end = fitting.run(&fitting.registered().ok()?).ok()?;
             let (model, x) = (fitting.model, &end.x);
@@ -468,30 +477,5 @@ impl<'a> Trial<'a> {
             squares.truncate(((1.0 - MAX_SET_ASIDE_SHARE) * squares.len() as f64).ceil() as usize);
         }
         squares.iter().sum::<f64>() / squares.len().max(1) as f64
-    }
-
-    /// Returns the misreading that two or more joints are reversed with the smallest error of the
-    /// registered nominal arm, and that error \[m\]. Of sets of joints with about the same error,
-    /// it is the smallest set. `singles` contains the reversals of single joints that are possible;
-    /// `None` if there are fewer than two.
-    fn several_reversed(&self, singles: &[Misreading]) -> Option<(Misreading, f64)> {
-        let joint = |misreading: &Misreading| match misreading {
-            Misreading::Reversed { joints } => Some(*joints),
-            _ => None,
-        };
-        let joints: Vec<u64> = singles.iter().filter_map(joint).take(MAX_REVERSED).collect();
-        let set = |bits: u64| -> u64 {
-            let members = joints.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1);
-            members.map(|(_, joint)| joint).sum()
-        };
-        let sets = (1..1_u64 << joints.len()).filter(|bits| bits.count_ones() > 1).map(set);
-        let sets: Vec<Misreading> = sets.map(|joints| Misreading::Reversed { joints }).collect();
-        let errors = self.registered_errors(&sets);
-        let best = errors.iter().map(|(_, error)| *error).fold(f64::INFINITY, f64::min);
-        let size = |found: &(Misreading, f64)| match found.0 {
-            Misreading::Reversed { joints } => joints.count_ones(),
-            _ => 0,
-        };
-        errors.into_iter().filter(|(_, error)| *error <= MAX_RATIO_TO_BEST * best).min_by_key(size)
     }
 }

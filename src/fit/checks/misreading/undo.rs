@@ -322,7 +322,7 @@ impl Misreading {
                     *position = -(*turn * *position);
                 }
             }
-            Self::ExchangedAxes | Self::FromBottom | Self::Transposed => {
+            Self::ExchangedAxes | Self::FromBottom | Self::Transposed | Self::FromOne => {
                 self.undo_image(&mut rows, problem);
             }
             Self::ExchangedTargets { target, with } => {

@@ -301,6 +301,9 @@ impl fmt::Display for Misreading {
             Self::Transposed => f.write_str(
                 "points of the marker that are numbered along the other side (its rows and columns exchanged)",
             ),
+            Self::FromOne => {
+                f.write_str("points of the marker that are numbered from 1 (point counts from 0)")
+            }
             Self::ShiftedViews { by } => {
                 let (views, side) = (by.unsigned_abs(), if by > 0 { "before" } else { "after" });
                 let plural = if views == 1 { "" } else { "s" };
