@@ -10,7 +10,6 @@ use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
 use super::chosen_rows::chosen_rows;
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
 use super::undo::is_unit_ratio;
-use super::views::{explanations_of_views, is_of_views};
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::common_scale::MIN_SCALE_ERROR;
 use crate::fit::checks::nominal_error::is_nominal_far_off;
@@ -96,20 +95,9 @@ pub(super) struct Trial<'a> {
     chosen: Vec<usize>,
 }
 
-impl CheckedFit<'_> {
-    /// Returns the misreadings of table or problem that explain the misfit; the first call searches
-    /// for them.
-    pub fn explanations(&self) -> &Explanations {
-        self.explanations.get_or_init(|| explanations(self))
-    }
-}
-
 /// Finds the misreadings that explain why the fit does not agree with its measurements.
-fn explanations(fit: &CheckedFit) -> Explanations {
+pub(super) fn explanations(fit: &CheckedFit) -> Explanations {
     let Fitting { measurements, model, .. } = fit.fitting;
-    if is_of_views(measurements) {
-        return explanations_of_views(fit);
-    }
     let nominal = fit.registered.identification.rms.norm;
     if nominal.is_nan() || nominal > MAX_REACHES * model.reach() {
         return Explanations::default();

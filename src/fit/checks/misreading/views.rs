@@ -12,9 +12,9 @@ use nalgebra::DVector;
 use super::Misreading;
 use super::candidates::candidates;
 use super::explanation::Explanations;
-use super::images::of_images;
+use super::images::{is_of_views, of_images};
 use super::reversed::MAX_REVERSED;
-use super::search::{MAX_EXPLAINED_RATIO, Trial, near_misreadings};
+use super::search::{MAX_EXPLAINED_RATIO, Trial, explanations, near_misreadings};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::Errors;
 use crate::fit::checks::checked_fit::CheckedFit;
@@ -23,9 +23,8 @@ use crate::fit::checks::row_kind::spread;
 use crate::fit::checks::view_order::views;
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::stages::stage::StageError;
-use crate::measurement::Measurements;
 use crate::numeric::parallel;
-use crate::problem::{Observation, Problem};
+use crate::problem::Problem;
 
 /// Maximum number of views, evenly spaced, to which misreadings are applied.
 const MAX_VIEWS: usize = 15;
@@ -41,9 +40,18 @@ const TRIAL_STEPS: u64 = 30;
 /// Largest ratio of the error after these steps to that before them, at which the fit goes on.
 const MAX_GAINED_RATIO: f64 = 0.5;
 
-/// Returns true if the leading rows of the table are pixels.
-pub(in crate::fit) fn is_of_views(table: &Measurements) -> bool {
-    table.leading().kind() == Observation::Pixel(0, 0, 0).kind()
+impl CheckedFit<'_> {
+    /// Returns the misreadings of table or problem that explain the misfit; the first call searches
+    /// for them.
+    pub fn explanations(&self) -> &Explanations {
+        self.explanations.get_or_init(|| {
+            if is_of_views(self.fitting.measurements) {
+                explanations_of_views(self)
+            } else {
+                explanations(self)
+            }
+        })
+    }
 }
 
 /// Returns the start of a fit of images: `begin`. If the nominal arm, with the errors `registered`,
@@ -97,7 +105,7 @@ pub(in crate::fit) fn with_readings(
 }
 
 /// Finds the misreadings that explain why a fit does not agree with its images.
-pub(super) fn explanations_of_views(fit: &CheckedFit) -> Explanations {
+fn explanations_of_views(fit: &CheckedFit) -> Explanations {
     let mut found = near_in_views(fit.fitting, fit.problem);
     let trial = Trial::of_rows(fit.fitting, fit.problem, rows_of_views(fit.fitting));
     found.as_read = trial.error_as_read(fit);
