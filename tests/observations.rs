@@ -25,5 +25,7 @@ mod overstated;
 mod recovery;
 #[path = "observations/results.rs"]
 mod results;
+#[path = "observations/view_readings.rs"]
+mod view_readings;
 #[path = "observations/views.rs"]
 mod views;

@@ -223,9 +223,9 @@ pub enum InputErrorKind {
     #[error("{word} is no point of the marker, whose points are numbered from 0 to {last}")]
     NoSuchPoint { word: String, last: usize },
     #[error(
-        "the point is behind the camera; {}", behind_camera_remedy(*fits, *miss)
+        "the point is behind the camera; {}", behind_camera_remedy(*fits, *miss, readings)
     )]
-    PointBehindCamera { fits: Option<bool>, miss: Option<f64> },
+    PointBehindCamera { fits: Option<bool>, miss: Option<f64>, readings: Vec<String> },
     #[error(
         "the points of the images of camera \"{camera}\" fit no pose of marker \"{marker}\": \
          they miss the nearest one by {declared:.1} px, and by {transposed:.1} px with corners \

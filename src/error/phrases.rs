@@ -133,7 +133,15 @@ pub(super) fn decimal_comma_remedy(found: usize, expected: usize) -> &'static st
 
 /// Returns the remedy for a point behind the camera. `fits` is true if the points of the images fit
 /// the marker by themselves, which they miss by `miss` \[px\].
-pub(super) fn behind_camera_remedy(fits: Option<bool>, miss: Option<f64>) -> String {
+pub(super) fn behind_camera_remedy(
+    fits: Option<bool>,
+    miss: Option<f64>,
+    readings: &[String],
+) -> String {
+    if !readings.is_empty() {
+        let named = readings.join(", or ");
+        return format!("the images fit if the table is read in another way: with {named}");
+    }
     let miss = miss.filter(|miss| miss.is_finite());
     let miss = miss.map_or_else(|| "far".to_owned(), |miss| format!("by {miss:.1} px"));
     match fits {

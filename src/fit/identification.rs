@@ -11,7 +11,7 @@ use crate::error::TableErrorKind;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::finding::{Finding, FindingCode};
 use crate::fit::checks::lens::lens_finding;
-use crate::fit::checks::misreading::Explanations;
+use crate::fit::checks::misreading::{Explanations, is_of_views, start_of_fit, with_readings};
 use crate::fit::checks::outliers::outliers;
 use crate::fit::checks::payload_place::payload_finding;
 use crate::fit::checks::pose_sufficiency::PoseSufficiency;
@@ -95,6 +95,13 @@ pub fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
     let mut found = fit_rows(model, problem, (measurements, split), options)?;
+    let is_far_off = |found: &Identification| {
+        found.findings.iter().any(|of| of.code == FindingCode::NominalFarOff)
+    };
+    if is_of_views(measurements) && !found.termination.converged() && is_far_off(&found) {
+        // Further fits would not lead to the images either.
+        return Ok(found);
+    }
     // A robust loss already limits the influence of single rows.
     if options.influential_rows && !options.provisional && problem.robust.is_none() {
         let warm_start = Some(Arc::new(found.warm_start(true)));
@@ -188,12 +195,13 @@ fn fit_rows(
         earlier: options.earlier.as_deref(),
     };
     if let Some(error) = fitting.unpredictable() {
-        return Err(problem.with_soft_joint(error).into());
+        let error = with_readings(&fitting, problem, problem.with_soft_joint(error));
+        return Err(error.into());
     }
     let unknowns = fitted_parameters(&fitting)?;
     let (start, registered) =
         prepared(&mut fitting, options.warm_start.as_deref(), has_declared_noise)?;
-    let begin = options.begin(model, &start);
+    let begin = start_of_fit(&mut fitting, &registered, options.begin(model, &start))?;
     let enough = PoseSufficiency::new(&fitting, problem, &unknowns, &start);
     // A few new rows cannot distinguish a larger noise from a change since the earlier data.
     let judged = options.earlier.is_none() && enough.judges_noise(unknowns.len());

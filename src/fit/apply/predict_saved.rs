@@ -240,7 +240,11 @@ pub fn predict(
     if let Some(row) = (0..rows.len()).find(is_behind) {
         return Err(rows
             .location(row)
-            .error(InputErrorKind::PointBehindCamera { fits: None, miss: None })
+            .error(InputErrorKind::PointBehindCamera {
+                fits: None,
+                miss: None,
+                readings: Vec::new(),
+            })
             .into());
     }
     let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));

@@ -1,17 +1,19 @@
 //! Check of the nominal arm: an error comparable to the measured workspace indicates a misread
 //! input.
 
+use std::collections::BTreeMap;
+
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::misreading::{Explanations, Misreading};
+use super::misreading::{Explanations, Misreading, is_of_views};
 use super::row_kind::{RowKind, format_error, quantity_noun, suspects};
 use crate::model::parameter::{Parameter, ParameterSite};
 
-/// Largest rms error of the registered nominal arm, relative to the spread of the measurements,
-/// that is not reported.
-const MAX_NOMINAL_MISS: f64 = 0.1;
+/// Largest error of the registered nominal arm (rms, or median of images), relative to the spread of
+/// the measurements, that is not reported.
+pub(super) const MAX_NOMINAL_MISS: f64 = 0.1;
 /// Largest rms error of the nominal arm with a misreading corrected, relative to the spread of the
 /// measurements, at which the misreading explains its error: nominal arms are wrong by about as
 /// much.
@@ -21,14 +23,31 @@ const MAX_EXPLAINED_MISS: f64 = 0.02;
 /// the arm's error.
 const MIN_RELATIVE_SPREAD: f64 = 0.05;
 
+/// Largest relative difference of the ratios of fitted to declared focal lengths and image centres
+/// at which the images have another size than declared.
+const MAX_SIZE_DIFFERENCE: f64 = 0.05;
+/// Smallest difference from 1 of these ratios at which the images have another size.
+const MIN_SIZE_ERROR: f64 = 0.1;
+
 /// Checks that the error of the registered nominal arm is small relative to the spread of the
 /// measurements.
 pub(super) struct NominalIsNear;
 
-/// Returns true if the rms error of the registered nominal arm in rows of the leading kind
-/// (positions, if there are any) exceeds [`MAX_NOMINAL_MISS`] times their spread.
+/// Returns the error of the registered nominal arm in rows of the leading kind (positions, if there
+/// are any): the rms error, or the median error of images, because a view from near may have errors
+/// far above those of all others.
+fn nominal_miss(fit: &CheckedFit) -> f64 {
+    if is_of_views(fit.fitting.measurements) {
+        fit.fitting.typical_error(fit.registered_x)
+    } else {
+        fit.registered.identification.rms.norm
+    }
+}
+
+/// Returns true if the error of the registered nominal arm in rows of the leading kind exceeds
+/// [`MAX_NOMINAL_MISS`] times their spread.
 pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
-    let rms = fit.registered.identification.rms.norm;
+    let rms = nominal_miss(fit);
     let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
     let is_measured_directly = observation.is_measured_directly();
     let min_spread =
@@ -57,13 +76,43 @@ impl Check for NominalIsNear {
         if !is_nominal_far_off(fit) {
             return Vec::new();
         }
-        let rms = fit.registered.identification.rms.norm;
+        let rms = nominal_miss(fit);
         let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
         let kind = observation.kind();
         let Explanations { near, near_error, .. } = fit.explanations();
         let explanations = (&near[..], *near_error);
-        vec![far_off_finding(kind, (rms, spread), fit.is_base_free(), explanations)]
+        let finding = far_off_finding(kind, (rms, spread), fit.is_base_free(), explanations);
+        vec![match image_size(fit).filter(|_| near.is_empty()) {
+            Some(words) => finding.with_remedy(words),
+            None => finding,
+        }]
     }
+}
+
+/// Returns the remedy for a camera whose focal lengths and image centre are all fitted at one
+/// multiple of the declared ones, which were those of images of another size; `None` if there is no
+/// such camera.
+fn image_size(fit: &CheckedFit) -> Option<String> {
+    let mut ratios: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for (parameter, x) in fit.fitting.model.parameters.iter().zip(&fit.end.x) {
+        if let ParameterSite::Fixture { fixture, axis: 6..=9, .. } = parameter.site {
+            ratios.entry(fixture).or_default().push(1.0 + x / parameter.nominal);
+        }
+    }
+    let of_camera = |(fixture, ratios): (&usize, &Vec<f64>)| {
+        let ratio = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        let is_alike = |other: &f64| (other / ratio - 1.0).abs() < MAX_SIZE_DIFFERENCE;
+        let is_other = ratios.len() == 4 && (ratio - 1.0).abs() > MIN_SIZE_ERROR;
+        (is_other && ratios.iter().all(is_alike)).then(|| {
+            let name = fit.fitting.model.fixture_name(*fixture);
+            format!(
+                "fx, fy, cx and cy of camera \"{name}\" are {ratio:.2} of the declared ones: the \
+                 images have another size than those that focal_px and centre_px are of; correct \
+                 these and image_px"
+            )
+        })
+    };
+    ratios.iter().find_map(of_camera)
 }
 
 /// Creates the finding that the rms error `rms` of the nominal arm is large relative to the

@@ -25,7 +25,7 @@ const MIN_VIEWS: usize = 3;
 const GOOD_ANGLE: f64 = 0.02;
 /// Number of draws of a few views from which poses are solved if all views together give a bad
 /// start. If a quarter of the views is spoiled, 42 % of the draws have none of these.
-const DRAWS: u64 = 24;
+const DRAWS: u64 = 12;
 
 /// View of one marker by one camera in one configuration.
 struct View {

@@ -33,6 +33,12 @@ const MANY_PLACEMENTS: usize = 128;
 /// Maximum number of solver steps of each stage in a repeated sweep. More would be wasted, because
 /// the next stage moves the optimum.
 const MAX_SWEEP_STEPS: u64 = 2;
+/// Maximum number of steps of a registration to images, whose start in closed form is near the
+/// optimum unless the table was misread.
+const MAX_STEPS_OF_VIEWS: u64 = 60;
+/// Largest ratio of the median error of images after a registration to that before it, at which the
+/// registration is kept.
+const MAX_DRAWN_RATIO: f64 = 1.5;
 
 /// Change of ν ln ‖r‖² (ν measured coordinates) by one step below which a provisional fit has
 /// converged. It is a thousandth of the change that decides whether an effect is added.
@@ -269,12 +275,31 @@ impl<'a> Fitting<'a> {
         let placements = self.placements();
         if !placements.is_empty() {
             let stage = self.placement_stage(&self.split.identification, placements);
-            x = Stage { cost_tolerance, ..stage }.run(&x)?.x;
+            let is_of_views = self.measurements.leading().description().unit == Unit::Pixel;
+            let max_steps = if is_of_views { MAX_STEPS_OF_VIEWS } else { stage.max_steps };
+            let end = Stage { cost_tolerance, max_steps, ..stage }.run(&x)?.x;
+            // A single view from near, whose pixels move far with every error of the nominal arm,
+            // may draw camera and marker away from where all other views have them.
+            let is_drawn_away =
+                is_of_views && self.typical_error(&end) > MAX_DRAWN_RATIO * self.typical_error(&x);
+            if !is_drawn_away {
+                x = end;
+            }
         }
         match self.held_out_stage() {
             Some(stage) => Ok(stage.run(&x)?.x),
             None => Ok(x),
         }
+    }
+
+    /// Returns the median length of the errors of the identification rows at the full parameter vector
+    /// `x`; infinity if most rows cannot be predicted.
+    pub fn typical_error(&self, x: &DVector<f64>) -> f64 {
+        let errors = self.position_errors(&self.split.identification, x);
+        let length = |norm: f64| if norm.is_nan() { f64::INFINITY } else { norm };
+        let mut lengths: Vec<f64> = errors.iter().map(|error| length(error.norm())).collect();
+        lengths.sort_by(f64::total_cmp);
+        lengths.get(lengths.len() / 2).copied().unwrap_or(f64::INFINITY)
     }
 
     /// Runs the stages of the strategy from `start`; several stages are repeated in turn until the

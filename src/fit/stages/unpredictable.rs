@@ -70,7 +70,7 @@ impl Fitting<'_> {
         let views = SingleViews::of(self.model, &self.poses(&alike), x);
         let fits = views.map(|views| !views.miss_the_marker());
         let miss = views.map(|views| views.declared);
-        let kind = InputErrorKind::PointBehindCamera { fits, miss };
+        let kind = InputErrorKind::PointBehindCamera { fits, miss, readings: Vec::new() };
         Some(self.measurements.location(row).error(kind))
     }
 

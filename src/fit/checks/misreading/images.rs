@@ -7,6 +7,11 @@ use crate::measurement::Measurements;
 use crate::observation::FixtureKind;
 use crate::problem::{Fixture, Observation, Problem};
 
+/// Returns true if the leading rows of the table are pixels.
+pub(in crate::fit) fn is_of_views(table: &Measurements) -> bool {
+    table.leading().kind() == Observation::Pixel(0, 0, 0).kind()
+}
+
 /// Returns the misreadings of images: exchanged or reversed axes, the numbering of the points,
 /// images that are shifted against the configurations, and other carriers of cameras and markers.
 pub(super) fn of_images(problem: &Problem, table: &Measurements) -> Vec<Misreading> {

@@ -9,7 +9,6 @@ use super::Misreading;
 use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
 use super::chosen_rows::chosen_rows;
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
-use super::images::of_images;
 use super::undo::is_unit_ratio;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::common_scale::MIN_SCALE_ERROR;
@@ -22,11 +21,11 @@ use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::numeric::parallel;
-use crate::problem::{Observation, Problem};
+use crate::problem::Problem;
 
 /// Largest ratio of the rms error with a misreading corrected to that without a correction, at
 /// which the misreading is an explanation.
-const MAX_EXPLAINED_RATIO: f64 = 0.2;
+pub(super) const MAX_EXPLAINED_RATIO: f64 = 0.2;
 /// Largest ratio of the error with a misreading corrected to that with the best one, at which the
 /// misreading is also named.
 pub(super) const MAX_RATIO_TO_BEST: f64 = 1.5;
@@ -96,16 +95,8 @@ pub(super) struct Trial<'a> {
     chosen: Vec<usize>,
 }
 
-impl CheckedFit<'_> {
-    /// Returns the misreadings of table or problem that explain the misfit; the first call searches
-    /// for them.
-    pub fn explanations(&self) -> &Explanations {
-        self.explanations.get_or_init(|| explanations(self))
-    }
-}
-
 /// Finds the misreadings that explain why the fit does not agree with its measurements.
-fn explanations(fit: &CheckedFit) -> Explanations {
+pub(super) fn explanations(fit: &CheckedFit) -> Explanations {
     let Fitting { measurements, model, .. } = fit.fitting;
     let nominal = fit.registered.identification.rms.norm;
     if nominal.is_nan() || nominal > MAX_REACHES * model.reach() {
@@ -132,9 +123,6 @@ fn explanations(fit: &CheckedFit) -> Explanations {
         candidates(fit.problem, measurements)
     };
     let mut tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
-    if measurements.leading().kind() == Observation::Pixel(0, 0, 0).kind() {
-        tested.extend(of_images(fit.problem, measurements));
-    }
     let mirrored = Misreading::Mirrored { axes: None };
     if !fit.is_base_free() && tested.contains(&mirrored) {
         tested.retain(|misreading| *misreading != mirrored);
@@ -158,7 +146,6 @@ fn explanations(fit: &CheckedFit) -> Explanations {
         .collect();
     let is_near_alone = !near_misreadings(&alone, nominal).is_empty();
     let near_alone = if is_near_alone { near_misreadings(&errors, nominal) } else { Vec::new() };
-    // Registrations to images take long, so that sets of joints are tried only if nothing else fits.
     if is_position || near_misreadings(&errors, nominal).is_empty() {
         errors.extend(trial.several_reversed(&tested));
     }
@@ -192,7 +179,7 @@ fn deviations(fitting: &Fitting, x: &DVector<f64>) -> f64 {
 
 /// Returns the misreadings whose error of the registered nominal arm is far smaller than `nominal`,
 /// the error without a correction. `errors` is in ascending order.
-fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
+pub(super) fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
     let best = errors.first().map_or(0.0, |found| found.1);
     let limit = (MAX_EXPLAINED_RATIO * nominal).min(MAX_RATIO_TO_BEST * best);
     errors.iter().take_while(|found| found.1 <= limit).map(|(misreading, _)| *misreading).collect()
@@ -206,7 +193,12 @@ impl<'a> Trial<'a> {
 
     /// Creates the trial on at most about `count` rows of a fit.
     pub(super) fn with_rows(fit: &'a CheckedFit, count: usize) -> Self {
-        Self { fitting: fit.fitting, problem: fit.problem, chosen: chosen_rows(fit.fitting, count) }
+        Self::of_rows(fit.fitting, fit.problem, chosen_rows(fit.fitting, count))
+    }
+
+    /// Creates the trial on the `chosen` rows of a fit.
+    pub(super) fn of_rows(fitting: &'a Fitting, problem: &'a Problem, chosen: Vec<usize>) -> Self {
+        Self { fitting, problem, chosen }
     }
 
     /// Returns the error of the fit as declared, or of its registered nominal arm if that is less
