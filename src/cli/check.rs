@@ -68,7 +68,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         CheckedPoses::Drawn(..) => "",
     };
     if let CheckedPoses::Table { poses, .. } = &poses {
-        let is_moved = |joint: &usize| problem.joints[*joint].command_kind() != JointKind::Fixed;
+        let is_moved = |joint: &usize| {
+            problem.joints.get(*joint).is_some_and(|of| of.command_kind() != JointKind::Fixed)
+        };
         common.hint(poses.still_joints().into_iter().filter(is_moved).map(|joint| {
             format!(
                 "joint {} stands still in all poses, so that they do not tell what its other \

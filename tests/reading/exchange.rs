@@ -182,8 +182,8 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
     let rows = |shift: f64| (0..8).map(move |k| (f64::from(61 * k) + shift, k));
     let times = |shift| rows(shift).map(|(time, k)| format!("P{k};1;2;3;{time}\n"));
     let near = format!("Point;X;y_mm;z_mm;time_s\n{}", times(0.3).collect::<String>());
-    let logged = rows(0.0).map(|(time, k)| format!("{time},{k},0\n")).collect::<String>();
-    let logged = format!("time_s,A1,A2\n{logged}");
+    let logged: Vec<String> = rows(0.0).map(|(time, k)| format!("{time},{k},0")).collect();
+    let logged = format!("time_s,A1,A2\n{}\n", logged.join("\n"));
     let narrow = joined("by = 'time', tolerance_s = 0.001", &near, &logged).unwrap_err();
     assert_says(&narrow, &["tolerance_s is too small", "write tolerance_s = 0.60 in joints"]);
     let twice = error(tracker, &log.replace("P2", "P1"));

@@ -277,7 +277,7 @@ impl<'a> Fitting<'a> {
             let stage = self.placement_stage(&self.split.identification, placements);
             let is_of_views = self.measurements.leading().description().unit == Unit::Pixel;
             let max_steps = if is_of_views { MAX_STEPS_OF_VIEWS } else { stage.max_steps };
-            let end = Stage { cost_tolerance, max_steps, ..stage }.run(&x)?.x;
+            let end = Stage { max_steps, cost_tolerance, ..stage }.run(&x)?.x;
             // A single view from near, whose pixels move far with every error of the nominal arm,
             // may draw camera and marker away from where all other views have them.
             let is_drawn_away =
