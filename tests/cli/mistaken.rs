@@ -75,7 +75,7 @@ fn targets_that_contradict_their_joint_columns_are_asked_about() {
     let message = warned(&oriented, &|row| row.extend([10.0, 20.0, 30.0]));
     assert_contains(&message, &["4 joints cannot hold both a position and an orientation"]);
     assert_eq!(warned(&header, &|_| {}), "");
-    let far = warned(&header, &|row| row[4..7].iter_mut().for_each(|x| *x = -0.3 * *x));
+    let far = warned(&header, &|row| row[4..7].iter_mut().for_each(|x| *x *= -0.3));
     assert_contains(&far, &["5 of 5 targets are 300 mm or more from where their joint columns"]);
 }
 
