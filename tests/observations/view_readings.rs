@@ -26,7 +26,7 @@ fn said_of(change: impl Fn(&mut [String])) -> String {
         if views.last() != Some(&cells[1]) {
             views.push(cells[1].clone());
         }
-        if views.len() % 3 == 0 {
+        if views.len().is_multiple_of(3) {
             change(&mut cells);
             writeln!(table, "{}", cells.join(",")).unwrap();
         }
