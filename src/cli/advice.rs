@@ -127,7 +127,11 @@ pub fn after_fit(
         None if found.has(FindingCode::PayloadAtTarget) => format!(
             "declare the place of the payload in {file} as the warning says, then flexcal identify {named}"
         ),
-        None if found.has(FindingCode::NoiseBeyondDeclared) => search,
+        None if found.has(FindingCode::StrategyMisfit)
+            || found.has(FindingCode::NoiseBeyondDeclared) =>
+        {
+            search
+        }
         None if !found.is_trusted() || report::determines_nothing(found) => {
             format!("flexcal check {named} says what the poses can tell")
         }

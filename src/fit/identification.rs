@@ -246,11 +246,9 @@ fn fit_rows(
     let sizes = || prior_sizes(&unknowns, &values, &statistics.covariance);
     let prior_sizes = if told { sizes() } else { Vec::new() };
     let spreads = fitting.spreads(&problem.fixtures, &start, &end.x);
-    let held_out_outliers = if asked {
-        held_out::outliers(&fitting, &end.x, &whole.unknowns, &statistics.covariance)
-    } else {
-        Vec::new()
-    };
+    let held_out = || held_out::rows(&fitting, &end.x, &whole.unknowns, &statistics.covariance);
+    let held_out_rows = if asked { held_out() } else { Vec::new() };
+    let held_out_outliers = held_out::outliers(&held_out_rows);
     let (findings, misread) = if asked {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         let refuted_priors = match (noise, fitting.loss) {
@@ -345,6 +343,7 @@ fn fit_rows(
         ),
         outliers,
         held_out_outliers,
+        held_out_rows,
         influential_rows: None,
         x: end.x,
         registered_x: start,

@@ -159,6 +159,8 @@ pub struct Identification {
     /// Held-out rows whose prediction error is too large for its uncertainty, in the order of the
     /// rows.
     pub held_out_outliers: Vec<Outlier>,
+    /// All held-out rows, from whose distances the outliers follow.
+    pub(crate) held_out_rows: Vec<Outlier>,
     /// Rows whose removal removes most of the misfit, if a few do. Searched for if
     /// [`Options::with_influential_rows`](crate::fit::Options::with_influential_rows) requests it,
     /// but not with a robust loss.

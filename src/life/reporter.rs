@@ -15,6 +15,9 @@ const MAX_GROUPS: usize = 60;
 /// Smallest expected evidence per pose for one cause against another \[nats\] at which more poses
 /// can distinguish the causes.
 const MIN_NATS_PER_POSE: f64 = 1e-3;
+/// Smallest ratio of the error with the most probable cause to that of a table read in another way,
+/// at which the table is misread.
+const MIN_MARGIN: f64 = 1.5;
 
 /// Cause of a change with its probability and size.
 #[derive(Debug, Clone)]
@@ -44,12 +47,12 @@ pub struct WatchedCause {
 }
 
 impl WatchedCause {
-    /// Returns the cause that the table is misread if its rows, read in another way, have a smaller
-    /// error than with the most probable of `causes`; else these causes. `misread` describes the
-    /// other way, with its error.
+    /// Returns the cause that the table is misread if its rows, read in another way, have a clearly
+    /// smaller error than with the most probable of `causes`; else these causes. `misread` describes
+    /// the other way, with its error.
     pub(super) fn or_misread(causes: Vec<Self>, misread: Option<(String, f64)>) -> Vec<Self> {
         let left = causes.first().and_then(|cause| cause.left_out_error).unwrap_or(f64::INFINITY);
-        let Some((label, error)) = misread.filter(|(_, error)| *error < left) else {
+        let Some((label, error)) = misread.filter(|(_, error)| MIN_MARGIN * error < left) else {
             return causes;
         };
         vec![Self {

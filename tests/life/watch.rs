@@ -209,12 +209,19 @@ fn a_zero_of_joint_1_that_moved_far_is_not_named_a_moved_base() {
     assert!((zero.changes[0].change - 20.0_f64.to_radians()).abs() < 1e-3, "{zero:?}");
 }
 
+/// Replaces the positions by others all over the workspace, which no reading explains.
+fn scatter(rows: &mut Measurements) {
+    for (row, position) in (1_u8..).map(f64::from).zip(&mut rows.positions) {
+        *position = Vector3::new((2.3 * row).sin(), (3.7 * row).cos(), (5.1 * row).sin()) * 0.4;
+    }
+}
+
 #[test]
 fn too_few_rows_name_no_moved_base() {
     let bench = Bench::new();
     let (arm, estimate) = calibrated(&bench, 9);
     let mut rows = bench.measure(&arm, 2, 4015, 1.0);
-    rows.positions.iter_mut().for_each(|position| *position *= 1e-3);
+    scatter(&mut rows);
     let verdict = judged(&bench, &estimate, &rows);
     assert_eq!(verdict.causes[0].kind, CauseKind::Other, "{verdict:?}");
 }
@@ -224,9 +231,28 @@ fn rows_that_no_cause_explains_are_called_so() {
     let bench = Bench::new();
     let (arm, estimate) = calibrated(&bench, 7);
     let mut rows = bench.measure(&arm, 12, 4013, 1.0);
-    rows.positions.iter_mut().for_each(|position| *position *= 1e-3);
+    scatter(&mut rows);
     let verdict = judged(&bench, &estimate, &rows);
     assert_eq!(verdict.named().unwrap().kind, CauseKind::Other, "{verdict:?}");
+}
+
+#[test]
+fn a_misread_table_is_not_judged_but_a_change_of_its_last_rows_is() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 7);
+    let clean = bench.measure(&arm, 10, 4013, 1.0);
+    let kind = |change: &dyn Fn(&mut [Vector3<f64>])| {
+        let mut rows = clean.clone();
+        change(&mut rows.positions);
+        let verdict = judged(&bench, &estimate, &rows);
+        verdict.causes.first().map(|cause| (cause.kind, cause.label.clone()))
+    };
+    let metres = kind(&|positions| positions.iter_mut().for_each(|at| *at *= 1e-3)).unwrap();
+    assert_eq!(metres.0, CauseKind::Misread, "{metres:?}");
+    let gross = kind(&|positions| positions[9].y += 0.05).unwrap();
+    assert_eq!(gross.1, "arrays:10 is off");
+    let last = kind(&|positions| positions[7..].iter_mut().for_each(|at| at.y += 0.05)).unwrap();
+    assert!(last.0 != CauseKind::Misread, "{last:?}");
 }
 
 /// Returns the rows of all tables, in their order.

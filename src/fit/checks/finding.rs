@@ -92,6 +92,10 @@ finding_codes! {
     Misread: Error "misread" ["explanations", "before", "after"]
         "With another reading of the table or the problem, less than a fifth of the error remains, or no more than noise.",
         "correct units, signs, order or convention in the table or the problem";
+    StrategyMisfit: Error "strategy-misfit" ["before", "after"]
+        "Another reading of the input would explain the error, but strategy joint leaves less than a \
+         fifth of it without one.",
+        "fit with strategy joint";
     ViewsReversed: Error "views-reversed" ["views", "before", "after"]
         "Some views number the points of a marker from the other end.",
         "reverse the column point in these views or leave them out; a board that looks different after half a turn prevents it";

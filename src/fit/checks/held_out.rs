@@ -25,16 +25,9 @@ const MIN_ERROR_RATIO: f64 = 1.5;
 /// is reported as worse than the nominal arm.
 const MIN_NOISE_MULTIPLE: f64 = 5.0;
 
-/// Returns the held-out rows that are farther from the prediction than the σ and the covariance of
-/// the fit allow, in the order of the rows.
-///
-/// A row is an outlier if P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², N rows
-/// and k measured numbers of the row. The residual r and the Jacobian J are whitened by the σ that
-/// the fit assumed, and C is the covariance of its `unknowns` at `x`. The scatter is the median
-/// over the rows of √(rᵀ (I + J C Jᵀ)⁻¹ r / median of χ²ₖ), or 1 if that is larger. If the model
-/// lacks an effect that acts in all rows, the scatter grows, so that not every row becomes an
-/// outlier.
-pub(in crate::fit) fn outliers(
+/// Returns all held-out rows, in their order, each with its length s · scatter as the distance
+/// ([`outliers`]).
+pub(in crate::fit) fn rows(
     fitting: &Fitting,
     x: &DVector<f64>,
     unknowns: &[usize],
@@ -71,17 +64,31 @@ pub(in crate::fit) fn outliers(
     };
     let lengths: Vec<f64> =
         (0..rows.len().div_ceil(CHUNK_ITEMS)).into_par_iter().flat_map_iter(of_chunk).collect();
-    let numbers: Vec<usize> =
-        stage.poses.iter().map(|pose| pose.observation.coordinates()).collect();
+    let errors = fitting.position_errors(rows, x);
+    let rows = rows.iter().zip(lengths).zip(errors);
+    rows.map(|((&row, length), error)| Outlier::new(fitting.measurements, row, length, error))
+        .collect()
+}
+
+/// Returns those of the held-out [`rows`] that are farther from the prediction than the σ and the
+/// covariance of the fit allow, in the order of the rows.
+///
+/// A row is an outlier if P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², N rows
+/// and k measured numbers of the row. The residual r and the Jacobian J are whitened by the σ that
+/// the fit assumed, and C is the covariance of its `unknowns` at `x`. The scatter is the median
+/// over the rows of √(rᵀ (I + J C Jᵀ)⁻¹ r / median of χ²ₖ), or 1 if that is larger. If the model
+/// lacks an effect that acts in all rows, the scatter grows, so that not every row becomes an
+/// outlier.
+pub(in crate::fit) fn outliers(rows: &[Outlier]) -> Vec<Outlier> {
+    let lengths: Vec<f64> = rows.iter().map(|row| row.distance).collect();
+    let numbers: Vec<usize> = rows.iter().map(|row| kind_named(row.kind).numbers).collect();
     let noise_lengths = noise_lengths_of_all(&numbers);
     let scatter = scatter(&lengths, &noise_lengths).max(1.0);
-    let errors = fitting.position_errors(rows, x);
-    let outlier = |place: usize| {
-        let (row, distance) = (rows[place], lengths[place] / scatter);
-        let outlier_of_row = || Outlier::new(fitting.measurements, row, distance, errors[place]);
-        (distance > noise_lengths[place].1).then(outlier_of_row)
+    let outlier = |(row, (_, limit)): (&Outlier, (f64, f64))| {
+        let distance = row.distance / scatter;
+        (distance > limit).then(|| Outlier { distance, ..row.clone() })
     };
-    (0..rows.len()).filter_map(outlier).collect()
+    rows.iter().zip(noise_lengths).filter_map(outlier).collect()
 }
 
 /// Returns the number of held-out rows of a fit that copy an identification row: configuration,
@@ -284,31 +291,37 @@ fn finding_of(rows: &[Outlier], of: usize) -> Finding {
 }
 
 impl Identification {
-    /// Judges the held-out rows with a remainder that is kept: rows that it brings near their
-    /// prediction are no outliers. `errors` are those of all rows with the remainder \[m\].
+    /// Judges all held-out rows with a remainder that is kept. `errors` are those of all rows with
+    /// the remainder \[m\]; rows without a finite one, and other rows than positions, are judged
+    /// without it.
     pub(crate) fn judge_corrected(&mut self, errors: &[Vector3<f64>]) {
-        let of = self.fitted.held_out.n;
-        let limit = noise_lengths_of_all(&vec![3; of]).first().map_or(0.0, |lengths| lengths.1);
         let corrected = |row: &Outlier| {
-            let error = errors.get(row.row).copied().unwrap_or(row.error);
-            let distance = row.distance * error.norm() / row.error.norm();
-            (row.kind != "position" || distance > limit).then(|| Outlier {
-                distance,
-                error,
-                ..row.clone()
-            })
-        };
-        self.held_out_outliers = self.held_out_outliers.iter().filter_map(corrected).collect();
-        let rows = &self.held_out_outliers;
-        self.findings.retain(|of| of.code != FindingCode::HeldOutOutliers || !rows.is_empty());
-        for finding in &mut self.findings {
-            match finding.code {
-                FindingCode::HeldOutOutliers => {
-                    let Finding { numbers, text, .. } = finding_of(rows, of);
-                    (finding.numbers, finding.text) = (numbers, text);
+            let error = errors.get(row.row).filter(|error| error.norm().is_finite());
+            match error.filter(|_| row.kind == "position" && row.error.norm() > 0.0) {
+                Some(&error) => {
+                    let distance = row.distance * error.norm() / row.error.norm();
+                    Outlier { distance, error, ..row.clone() }
                 }
-                FindingCode::HeldOutBeyondPrediction => finding.text += ", without the remainder",
-                _ => {}
+                None => row.clone(),
+            }
+        };
+        let corrected: Vec<Outlier> = self.held_out_rows.iter().map(corrected).collect();
+        self.held_out_outliers = outliers(&corrected);
+        let code = FindingCode::HeldOutOutliers;
+        let place = self.findings.iter().position(|finding| finding.code == code);
+        let found = (!self.held_out_outliers.is_empty())
+            .then(|| finding_of(&self.held_out_outliers, corrected.len()));
+        match (place, found) {
+            (Some(place), Some(Finding { numbers, text, .. })) => {
+                let finding = &mut self.findings[place];
+                (finding.numbers, finding.text) = (numbers, text);
+            }
+            (Some(place), None) => drop(self.findings.remove(place)),
+            (None, found) => self.findings.extend(found),
+        }
+        for finding in &mut self.findings {
+            if finding.code == FindingCode::HeldOutBeyondPrediction {
+                finding.text += ", without the remainder";
             }
         }
     }

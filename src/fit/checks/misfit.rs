@@ -25,15 +25,15 @@ const MIN_REPORTED_ERROR: f64 = 1000.0;
 const MIN_OTHER_ARM_MISS: f64 = 0.5;
 /// Largest ratio between the spreads of measured and predicted points that is not reported.
 const MAX_SIZE_RATIO: f64 = 2.0;
-/// Ratios of the spread of the nominal arm's points to that of the measured ones, with the units that
-/// give them.
-const SIZES_OF_UNITS: [(f64, &str); 6] = [
-    (1e3, "the positions are probably in metres, declared as millimetres"),
-    (1e-3, "the positions are probably in millimetres, declared as metres"),
-    (25.4, "the positions are probably in inches, declared as millimetres"),
-    (10.0, "the positions are probably in centimetres, declared as millimetres"),
-    (0.1, "the positions are probably in tenths of a millimetre"),
-    (0.01, "the positions are probably in hundredths of a millimetre"),
+/// Ratios of the spread of the nominal arm's points to that of the measured ones, each with the unit
+/// that gives it, and whether the column is then declared in metres instead of millimetres.
+const SIZES_OF_UNITS: [(f64, bool, &str); 6] = [
+    (1e3, false, "the positions are probably in metres, declared as millimetres"),
+    (1e-3, true, "the positions are probably in millimetres, declared as metres"),
+    (25.4, false, "the positions are probably in inches, declared as millimetres"),
+    (10.0, false, "the positions are probably in centimetres, declared as millimetres"),
+    (0.1, false, "the positions are probably in tenths of a millimetre"),
+    (0.01, false, "the positions are probably in hundredths of a millimetre"),
 ];
 /// Largest deviation of such a ratio from that of two units: its logarithm.
 const MAX_OFF_UNIT: f64 = 0.4;
@@ -121,11 +121,12 @@ impl Check for SizeOfArm {
                 return None;
             }
             let nominal = fit.fitting.position_errors(rows, fit.registered_x);
-            let positions = &fit.fitting.measurements.positions;
+            let table = &fit.fitting.measurements;
+            let positions = &table.positions;
             let predicted = spread(fit.fitting.placement, rows, |place| {
                 positions[rows[place]] - nominal[place]
             });
-            other_size_finding(kind.spread, predicted)
+            other_size_finding((kind.spread, predicted), table.position_unit)
         };
         fit.kinds().into_iter().filter_map(of_kind).collect()
     }
@@ -188,8 +189,8 @@ fn no_better_finding(kind: &RowKind, before: f64, after: f64) -> Option<Finding>
 
 /// Returns the finding that the measured points belong to an arm of another size. Their spread
 /// `measured` \[m\] then differs much from the spread `expected` \[m\] of the points that the
-/// nominal arm predicts. `None` if the two are alike.
-fn other_size_finding(measured: f64, expected: f64) -> Option<Finding> {
+/// nominal arm predicts. `None` if the two are alike. `declared` is the unit of the columns \[m\].
+fn other_size_finding((measured, expected): (f64, f64), declared: Option<f64>) -> Option<Finding> {
     let is_same = (expected / MAX_SIZE_RATIO..=expected * MAX_SIZE_RATIO).contains(&measured);
     if expected <= MIN_SPREAD || is_same {
         return None;
@@ -202,11 +203,14 @@ fn other_size_finding(measured: f64, expected: f64) -> Option<Finding> {
     let numbers = [measured.into(), expected.into()];
     let finding = Finding::new(FindingCode::OtherSize, numbers, text);
     let ratio = (expected / measured).ln();
-    let unit = SIZES_OF_UNITS.iter().find(|(factor, _)| (ratio - factor.ln()).abs() < MAX_OFF_UNIT);
+    let unit = SIZES_OF_UNITS.iter().find(|(factor, in_metres, _)| {
+        declared.is_none_or(|unit| (unit >= 1.0) == *in_metres)
+            && (ratio - factor.ln()).abs() < MAX_OFF_UNIT
+    });
     Some(match unit {
-        Some((_, words)) => {
-            finding.with_remedy(format!("{words}; otherwise check what the columns hold"))
-        }
+        Some((.., words)) => finding.with_remedy(format!(
+            "{words}; otherwise check the lengths of the joint table and what the columns hold"
+        )),
         None => finding,
     })
 }

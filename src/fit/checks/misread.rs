@@ -31,8 +31,6 @@ const MAX_PLAIN_PART: f64 = 0.8;
 /// Largest ratio of the rms residual with strategy joint to that of the fit, at which the strategy
 /// causes the residual, not the reading of table or problem.
 const MAX_JOINT_RATIO: f64 = 0.2;
-/// Remedy if the strategy of the fit causes the residual.
-pub(super) const FIT_JOINTLY: &str = "fit with strategy joint";
 
 /// Checks that no misreading of table or problem (unit, sign, order, convention) explains the
 /// measurements far better.
@@ -74,15 +72,14 @@ impl Check for ReadAsMeant {
         let Some(best) = explanations.fitted.first() else { return Vec::new() };
         let joint = fit.joint_rms(&kind);
         if let Some(joint) = joint.filter(|joint| *joint < MAX_JOINT_RATIO * rms) {
+            let numbers = [rms.into(), joint.into()];
             let [joint, rest] =
                 [joint, rms].map(|error| format_error(kind.observation.kind(), error, 3));
             let strategy = fit.fitting.strategy.as_str();
             let text = format!(
                 "strategy {strategy} leaves an rms error of {rest}, strategy joint {joint}"
             );
-            let numbers = [fit.noise_factor.into(), fit.sigma_taken.into()];
-            let finding = Finding::new(FindingCode::NoiseBeyondDeclared, numbers, text);
-            return vec![finding.with_remedy(FIT_JOINTLY.to_owned())];
+            return vec![Finding::new(FindingCode::StrategyMisfit, numbers, text)];
         }
         let words: Vec<&str> =
             explanations.fitted.iter().map(|explanation| explanation.words.as_str()).collect();

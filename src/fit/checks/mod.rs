@@ -205,8 +205,8 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         let remedy = if fit.ignores_elasticity() {
             "strategy rigid ignores the elasticity that the problem declares, so fit with \
              strategy joint"
-        } else if findings.iter().any(|found| found.remedy == misread::FIT_JOINTLY) {
-            misread::FIT_JOINTLY
+        } else if findings.iter().any(|found| found.code == FindingCode::StrategyMisfit) {
+            FindingCode::StrategyMisfit.entry().remedy
         } else {
             ""
         };

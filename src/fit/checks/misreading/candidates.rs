@@ -72,7 +72,7 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(table.orientations.is_some().then_some(Misreading::InversePose));
     units.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
     units.extend(long.then_some(Misreading::ArmInMillimetres));
-    units.extend(of_commands(problem));
+    units.extend(of_commands(problem, table));
     units.extend(of_order(table));
     units.extend(of_text_order(table));
     units.extend(of_joint_table(problem));

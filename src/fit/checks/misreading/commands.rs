@@ -75,7 +75,7 @@ fn of_rings(joints: &[usize]) -> impl Iterator<Item = Misreading> {
 
 /// Returns the misreadings of the joint columns: signs, exchanged columns, couplings, zero
 /// positions and ratios.
-pub(super) fn of_commands(problem: &Problem) -> Vec<Misreading> {
+pub(super) fn of_commands(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
     let kind = |joint: usize| problem.joints[joint - 1].command_kind();
     let moving: Vec<usize> = (1..=problem.joints.len().min(64))
         .filter(|&joint| kind(joint) != JointKind::Fixed)
@@ -107,6 +107,7 @@ pub(super) fn of_commands(problem: &Problem) -> Vec<Misreading> {
         }
     }
     misreadings.extend(of_rings(&turning));
+    keep_different_orders(&mut misreadings, problem, table);
     for &joint in &turning {
         let steps =
             (1 - 180 / ZERO_POSITION_STEP..=180 / ZERO_POSITION_STEP).filter(|&step| step != 0);
@@ -118,6 +119,23 @@ pub(super) fn of_commands(problem: &Problem) -> Vec<Misreading> {
         misreadings.extend(TRIAL_RATIOS.map(|percent| Misreading::Ratio { joint, percent }));
     }
     misreadings
+}
+
+/// Removes exchanges of columns that give the same order as an earlier one.
+fn keep_different_orders(of: &mut Vec<Misreading>, problem: &Problem, table: &Measurements) {
+    use Misreading::{Alphabetical, Cycled, Exchanged, OppositeOrder, Rotated};
+    let mut orders = Vec::new();
+    of.retain(|misreading| {
+        let exchanges = matches!(
+            misreading,
+            OppositeOrder | Alphabetical | Rotated { .. } | Exchanged { .. } | Cycled { .. }
+        );
+        let mut order: Vec<f64> = (0_u16..).map(f64::from).take(problem.joints.len()).collect();
+        misreading.undo_command(&mut order, problem, table);
+        let is_new = !exchanges || !orders.contains(&order);
+        orders.extend((exchanges && is_new).then_some(order));
+        is_new
+    });
 }
 
 /// Returns the indices of the joints that take commands, in the alphabetical order of their names.

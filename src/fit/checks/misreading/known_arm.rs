@@ -14,10 +14,15 @@ use crate::problem::Problem;
 
 /// Maximum number of rows, evenly spaced, that are predicted with each misreading.
 const MAX_PREDICTED_ROWS: usize = 12;
+/// Minimum number of different configurations from which a misreading is named.
+const MIN_CONFIGURATIONS: usize = 4;
 
 /// Returns the misreadings of a `table` of positions with which an arm predicts them far better, and
-/// the rms error that the best one leaves \[m\]. The arm has the full parameter vector `x`. `None` if
-/// no misreading leaves less than [`MAX_CLEAR_RATIO`] of the error.
+/// the rms error of all positions that the best one leaves \[m\]. The arm has the full parameter
+/// vector `x`. `None` if no misreading leaves less than [`MAX_CLEAR_RATIO`] of the error, or if the
+/// table has fewer than [`MIN_CONFIGURATIONS`].
+///
+/// Misreadings that leave out rows are not tried, because these rows may be the ones that are off.
 pub(crate) fn misread_table(
     problem: &Problem,
     (model, x): (&Model, &DVector<f64>),
@@ -26,10 +31,13 @@ pub(crate) fn misread_table(
     let placement = Placement::of(table);
     let of_positions: Vec<usize> =
         (0..table.len()).filter(|&row| table.observation(row).is_position()).collect();
+    if table.select(&of_positions).configurations(problem).1 < MIN_CONFIGURATIONS {
+        return None;
+    }
     let step = of_positions.len().div_ceil(MAX_PREDICTED_ROWS).max(1);
-    let chosen: Vec<usize> = of_positions.into_iter().step_by(step).collect();
-    let error = |misreading: Misreading| {
-        let rows = misreading.undone(table, &chosen, (problem, table.joints));
+    let chosen: Vec<usize> = of_positions.iter().copied().step_by(step).collect();
+    let error = |misreading: Misreading, chosen: &[usize]| {
+        let rows = misreading.undone(table, chosen, (problem, table.joints));
         let of_rows = Placement::of(&rows);
         if of_rows.bases != placement.bases || of_rows.targets != placement.targets {
             return None;
@@ -40,11 +48,14 @@ pub(crate) fn misread_table(
         let rms = (squares / residuals.len() as f64).sqrt();
         rms.is_finite().then_some((misreading, rms))
     };
-    let reversed = |joints: u64| Misreading::Reversed { joints };
-    let (_, as_read) = error(reversed(0))?;
+    let as_read = |chosen: &[usize]| Some(error(Misreading::Reversed { joints: 0 }, chosen)?.1);
+    let leaves_out_rows = |misreading: &Misreading| {
+        matches!(misreading, Misreading::Shifted { .. } | Misreading::ShiftedPayload { .. })
+    };
     // The estimate contradicts misreadings of the problem, and small zero offsets are changes.
     let is_of_table = |misreading: &Misreading| {
         !matches!(misreading, Misreading::Zero { .. } | Misreading::Mirrored { .. })
+            && !leaves_out_rows(misreading)
             && !misreading.concerns_problem()
             && misreading.rewritten(problem).is_none()
     };
@@ -52,18 +63,34 @@ pub(crate) fn misread_table(
     tested.retain(is_of_table);
     let axes = (0..3).flat_map(|first| (first..3).map(move |second| Some([first, second])));
     tested.extend(axes.map(|axes| Misreading::Mirrored { axes }));
+    let reversed = |joints: u64| Misreading::Reversed { joints };
     let sets = 1..1_u64 << table.joints.min(MAX_REVERSED);
     tested.extend(sets.filter(|joints| joints.count_ones() > 1).map(reversed));
-    let mut errors: Vec<(Misreading, f64)> =
-        parallel::map_items(&tested, |misreading| error(*misreading))
-            .into_iter()
-            .flatten()
-            .collect();
-    errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let best = errors.first()?.1;
-    let limit = (MAX_CLEAR_RATIO * as_read).min(MAX_RATIO_TO_BEST * best);
-    let explaining = errors.iter().take_while(|(_, rms)| *rms <= limit).take(MAX_NAMED);
-    let words: Vec<String> =
-        explaining.map(|(misreading, _)| misreading.described(None, problem)).collect();
-    (!words.is_empty()).then(|| (words.join(", or "), best))
+    let near = |errors: Vec<Option<(Misreading, f64)>>, as_read: f64| {
+        let mut errors: Vec<(Misreading, f64)> = errors.into_iter().flatten().collect();
+        errors.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let best = errors.first().map_or(0.0, |found| found.1);
+        let limit = (MAX_CLEAR_RATIO * as_read).min(MAX_RATIO_TO_BEST * best);
+        errors.retain(|(_, rms)| *rms <= limit);
+        errors
+    };
+    let errors = parallel::map_items(&tested, |misreading| error(*misreading, &chosen));
+    // The few rows only choose the misreadings that are tried with all.
+    let chosen = near(errors, as_read(&chosen)?).into_iter();
+    let errors = chosen.map(|(misreading, _)| error(misreading, &of_positions)).collect();
+    let explaining = near(errors, as_read(&of_positions)?);
+    let best = explaining.first()?.1;
+    let words = |misreading: Misreading| {
+        let words = misreading.described(None, problem);
+        let may_be_of_arm = matches!(
+            misreading,
+            Misreading::Ratio { .. }
+                | Misreading::Coupled { .. }
+                | Misreading::Screw { .. }
+                | Misreading::Reversed { .. }
+        );
+        if may_be_of_arm { format!("{words} (or the arm has changed so)") } else { words }
+    };
+    let named = explaining.iter().take(MAX_NAMED).map(|(misreading, _)| words(*misreading));
+    Some((named.collect::<Vec<_>>().join(", or "), best))
 }
