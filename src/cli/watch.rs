@@ -167,7 +167,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(match watch.causes.first() {
         _ if !watch.is_changed() => Outcome::Done,
         Some(cause) if cause.kind == CauseKind::Misread => {
-            diagnostic::warn(&format!("not judged: the table may be misread, {}", cause.label));
+            if !common.prints_text() {
+                diagnostic::warn(&format!("not judged: the table may be misread, {}", cause.label));
+            }
             Outcome::NotMet
         }
         _ => Outcome::Changed,

@@ -92,7 +92,7 @@ impl Contradiction {
         let still = if index == 0 { "" } else { "with that, they still do; " };
         let cause = if self.noise_ratio.is_some() {
             let what = if index == 0 { "them" } else { "the rest" };
-            format!("{still}no change that was tried explains {what}, only {}", self.label)
+            format!("{still}no change that was tried explains {what} as well as {}", self.label)
         } else {
             let probability = 100.0 * self.probability;
             format!(

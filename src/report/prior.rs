@@ -83,7 +83,9 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
             None => ". Their agreement could not be tested.".to_owned(),
         },
         [noise] if comparison.has_raised_sigma => {
-            format!(". They disagree, and no change that was tried explains that, only {noise}.")
+            format!(
+                ". They disagree, and no change that was tried explains that as well as {noise}."
+            )
         }
         causes => {
             // χ² counts all coordinates alike, so that a small change of one kind may leave it as
