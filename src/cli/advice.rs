@@ -14,8 +14,8 @@ use super::plan;
 
 /// Smallest number of poses that a suggested plan has to distinguish two effects.
 const MIN_SEPARATING_POSES: usize = 12;
-/// Largest number of these poses, as a multiple of the measured ones.
-const MAX_SEPARATING_RATIO: f64 = 3.0;
+/// Largest number of these poses.
+const MAX_SEPARATING_POSES: usize = 60;
 /// Odds of an effect against its rival at which the cause counts as certain.
 const CERTAIN_ODDS: f64 = 19.0;
 /// Smallest number of new poses of which some may be held out without a warning.
@@ -170,11 +170,11 @@ pub fn after_fit(
 }
 
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared
-/// problem, and `results` are the files that the loop wrote.
+/// problem to rows of `measured_poses` poses, and `results` are the files that the loop wrote.
 pub fn after_loop(
     common: &Common,
     problem: &Problem,
-    fit: &Identification,
+    (fit, measured_poses): (&Identification, usize),
     result: &LoopResult,
     results: &Results,
 ) -> String {
@@ -204,13 +204,13 @@ pub fn after_loop(
         let rival = found.alternatives.first()?;
         let pair = [found.effect.declaration.clone(), rival.effect.declaration.clone()];
         let law = found.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
-        Some((pair, separating_poses(law / rival.probability, fit.fitted.identification.n)))
+        Some((pair, separating_poses(law / rival.probability, measured_poses)))
     });
-    let can_be_planned = |(pair, _): &([String; 2], String)| {
+    let can_be_planned = |(pair, _): &([String; 2], (usize, bool))| {
         PoseRanges::of(problem).is_ok() && plan::effect_pair(pair, problem).is_ok()
     };
     let closed = shell_word(&results.path("problem.closed.toml"));
-    if let Some(([effect, rival], poses)) = pairs.find(can_be_planned) {
+    if let Some(([effect, rival], (poses, is_enough))) = pairs.find(can_be_planned) {
         // The plan counts measured poses only if their files are named.
         let measured: Vec<String> = match common.data() {
             [] => problem.data.files.iter().map(|file| shell_word(file)).collect(),
@@ -221,9 +221,13 @@ pub fn after_loop(
         } else {
             format!(" --data {}", measured.join(" "))
         };
+        let choice = if is_enough {
+            "chooses about as many further poses as it takes to tell the two apart"
+        } else {
+            "chooses further poses that tell the two apart best, though more may be needed"
+        };
         let plan = format!(
-            "flexcal plan {named}{data} --poses {poses} --separate '{effect}' '{rival}' chooses about as many further poses as it takes to \
-             tell the two apart"
+            "flexcal plan {named}{data} --poses {poses} --separate '{effect}' '{rival}' {choice}"
         );
         return format!(
             "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {plan}"
@@ -254,13 +258,14 @@ pub fn after_loop(
 }
 
 /// Returns the number of further poses after which an effect is expected to have [`CERTAIN_ODDS`]
-/// against its rival, if its odds are `odds` after `measured` poses. The logarithm of the odds grows
-/// in proportion to the poses.
-fn separating_poses(odds: f64, measured: usize) -> String {
+/// against its rival, if its odds are `odds` after `measured` poses, and true; or the largest number
+/// and false if that does not suffice. The logarithm of the odds grows in proportion to the poses.
+fn separating_poses(odds: f64, measured: usize) -> (usize, bool) {
     let wanted = measured as f64 * (CERTAIN_ODDS.ln() / odds.max(1.0).ln() - 1.0);
-    let least = MIN_SEPARATING_POSES as f64;
-    let most = (MAX_SEPARATING_RATIO * measured as f64).max(least);
-    format!("{:.0}", wanted.clamp(least, most).ceil())
+    let is_enough = (MIN_SEPARATING_POSES..=MAX_SEPARATING_POSES)
+        .find(|&poses| poses as f64 >= wanted)
+        .map(|poses| (poses, true));
+    is_enough.unwrap_or((MAX_SEPARATING_POSES, false))
 }
 
 /// Returns what to do after an estimate was applied to rows that do not contradict it. `path` is the

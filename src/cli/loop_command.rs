@@ -107,7 +107,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             let accuracy = PredictionAccuracy::new(&closure.after, &shown);
             report::loop_brief(&problem, &closure, accuracy)
         };
-        let next = advice::after_loop(common, &problem, &closure.before.fit, &result, &results);
+        let poses = data.measurements.pose_numbers(&problem);
+        let mut fitted: Vec<usize> =
+            data.split.identification.iter().map(|&row| poses[row]).collect();
+        fitted.sort_unstable();
+        fitted.dedup();
+        let fit = (&closure.before.fit, fitted.len());
+        let next = advice::after_loop(common, &problem, fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())
     })?;
     Ok(if closure.interrupted { Outcome::NotMet } else { outcome })

@@ -15,7 +15,8 @@ const MISTAKEN_WORDS: [(&[&str], &str); 17] = [
     ),
     (
         &["--heldout", "--held-out", "--held_out", "--holdout", "--fraction"],
-        "the problem says which poses are held out: held_out = { fraction = 0.3, seed = 1 } in [data]",
+        "the problem says which poses are held out: held_out = { fraction = 0.3, seed = 1 } in \
+         [data]; identify --held-out none fits all of them",
     ),
     (
         &["-d", "--file", "--files", "--measurements", "--input", "-i", "--table", "--csv"],

@@ -240,13 +240,13 @@ fn next_step(
 ) -> String {
     let common = &asked.common;
     let arguments = common.problem_arguments();
+    let prior = asked.prior_words().iter().fold(String::new(), |all, word| all + " " + word);
     if !next.found.is_trusted() {
-        return format!("flexcal identify {arguments} says why the fit is not to be trusted");
+        return format!(
+            "flexcal identify {arguments}{prior} says why the fit is not to be trusted"
+        );
     }
     let flags = asked.flags();
-    if !next.found.is_trusted() && next.stop.is_none() {
-        return format!("flexcal identify {arguments} says what to correct");
-    }
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
     // The new rows of an update are too few for a search.
@@ -272,7 +272,6 @@ fn next_step(
         String::new()
     };
     if next.poses.is_empty() {
-        let prior = asked.prior_words().iter().fold(String::new(), |all, word| all + " " + word);
         return format!("{lacks}flexcal identify {arguments}{prior} writes the estimate to apply");
     }
     let file = shell_word(common.problem());

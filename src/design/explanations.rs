@@ -41,6 +41,11 @@ pub enum ExplanationsError {
     Newer { file: PathBuf, version: u32 },
     #[error("{}: changed since flexcal wrote it; run flexcal loop again", file.display())]
     Changed { file: PathBuf },
+    #[error(
+        "poses for causes are chosen without a prior: an update says nothing of effects that the problem does not declare; leave --prior \
+         out, or choose for accuracy"
+    )]
+    WithPrior,
     #[error("{}: is of problem {found}, not of {expected}", file.display())]
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error(

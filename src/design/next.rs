@@ -209,6 +209,9 @@ pub fn next(
     if poses == 0 {
         return Err(DesignError::NoPoses.into());
     }
+    if options.update.is_some() && options.purpose != Purpose::Accuracy {
+        return Err(ExplanationsError::WithPrior.into());
+    }
     options.explanations.map_or(Ok(()), |of| of.check_rows(&data.measurements))?;
     let found = match options.update {
         Some((found, _)) => found.clone(),
@@ -317,8 +320,7 @@ pub fn next(
         view(&greedy.covariance).dot(&view(&scaled)).max(0.0)
     };
     let before = remaining_error(&greedy);
-    let is_trusted = found.is_trusted();
-    let stop = error.filter(|_| is_trusted).and_then(|error| stop_reason(&error, options));
+    let stop = error.filter(|_| found.is_trusted()).and_then(|error| stop_reason(&error, options));
     let mut result = NextPoses {
         poses: pool.select(&[]),
         steps: Vec::new(),

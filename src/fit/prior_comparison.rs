@@ -33,6 +33,8 @@ pub(crate) struct PriorComparison {
     pub causes: Vec<String>,
     /// True if one of `causes` is larger noise, so that the fit assumes a larger σ.
     pub has_raised_sigma: bool,
+    /// True if larger noise is the most probable cause even after the fit allowed for all `causes`.
+    pub is_unexplained: bool,
     /// Comparison of each parameter of which the prior contains information.
     pub parameters: Vec<ComparedParameter>,
 }

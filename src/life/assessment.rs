@@ -50,6 +50,14 @@ pub(super) struct AssessedCause {
     pub covariance: DMatrix<f64>,
 }
 
+impl Assessment {
+    /// Returns the assessment with the probability of each cause multiplied by `part`.
+    pub fn scaled(mut self, part: f64) -> Self {
+        self.causes.iter_mut().for_each(|cause| cause.probability *= part);
+        self
+    }
+}
+
 impl AssessedCause {
     /// Returns the name of the cause, with its row or its onset; `location` names a row by its file
     /// and line.

@@ -126,7 +126,7 @@ pub(super) struct Cause {
     /// Columns of the sensitivities that the cause moves.
     pub columns: Vec<usize>,
     /// Parameters that each of these columns moves together, with the change of each for a unit
-    /// amplitude.
+    /// amplitude, the root mean square over the rows.
     pub terms: Vec<Vec<(usize, f64)>>,
     /// Name and unit of each amplitude.
     pub amplitudes: Vec<(String, Unit)>,
@@ -343,13 +343,12 @@ impl Extended {
 
     /// Returns true if a cause moves parameters, all of which the model holds.
     pub fn is_held(&self, cause: &Cause) -> bool {
-        let held = self.declared..self.model.parameters.len();
-        !cause.columns.is_empty() && cause.columns.iter().all(|k| held.contains(k))
+        !cause.columns.is_empty() && !self.has_free_parameter(cause)
     }
 
     /// Returns true if a cause moves a parameter that the model frees.
     fn has_free_parameter(&self, cause: &Cause) -> bool {
-        cause.columns.iter().any(|&k| k < self.declared)
+        cause.terms.iter().flatten().any(|&(k, _)| k < self.declared)
     }
 
     /// Returns the causes without those whose parameters are all held, if the moves of a placement
@@ -420,14 +419,19 @@ impl Extended {
             Some(_) => (Unit::PerDegree, 0.1),
             None => (Unit::Ratio, 1.0),
         };
-        // The change of a parameter at the mean temperature of the rows.
-        let mean = warmth.map_or(1.0, |warmth| warmth.iter().sum::<f64>() / warmth.len() as f64);
+        // Terms hold the root mean square change of a parameter over the rows, because the mean of
+        // rows above and below the reference may be 0.
+        let mean_square =
+            |warmth: &[f64]| warmth.iter().map(|t| t * t).sum::<f64>() / warmth.len() as f64;
+        let warmth_of_rows = warmth.map_or(1.0, |warmth| mean_square(warmth).sqrt());
         let thermal =
             |label: String, (column, terms): (usize, &[_]), amplitude, sizes: &[f64]| Cause {
                 kind: CauseKind::Temperature,
                 label,
                 columns: vec![column],
-                terms: vec![terms.iter().map(|&(k, factor)| (k, mean * factor)).collect()],
+                terms: vec![
+                    terms.iter().map(|&(k, factor)| (k, warmth_of_rows * factor)).collect(),
+                ],
                 amplitudes: vec![amplitude],
                 trials: trials(sizes.iter().map(|&size| vec![size]), 1.0),
                 ln_weight: 0.0,

@@ -25,6 +25,8 @@ pub(super) struct Contradiction {
     pub relocated: Option<(Placed, DVector<f64>)>,
     /// True if the cause moves parameters, all of which the problem holds.
     pub is_held: bool,
+    /// True if the cause is two changes together, and the problem holds some of their parameters.
+    pub is_part_held: bool,
     /// Name of the free parameters that are widened instead of held ones, because they move the
     /// rows in the same way.
     pub instead: Option<String>,
@@ -42,6 +44,7 @@ impl Contradiction {
             widened: Vec::new(),
             relocated: Some(place),
             is_held: false,
+            is_part_held: false,
             instead: None,
             noise_ratio: None,
         }
@@ -61,9 +64,8 @@ impl Contradiction {
     }
 
     /// Returns the finding that the new rows contradict the prior in `file`. `index` is the number
-    /// of causes that were found before this one, and `nearest` the first of them if this one is
-    /// larger noise, so that they explain nothing.
-    fn finding(&self, index: usize, nearest: Option<&Self>, file: &Path) -> Finding {
+    /// of causes that were found before this one.
+    fn finding(&self, index: usize, file: &Path) -> Finding {
         let is_refitted = self.relocated.is_some() || !self.widened.is_empty();
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
             _ if self.relocated.is_some() => {
@@ -79,25 +81,24 @@ impl Contradiction {
                                   others: free them in [parameters]"
                     .to_owned()
             }
+            (false, _) if self.is_part_held => {
+                "; the prior of those of its parameters that the problem frees was widened"
+                    .to_owned()
+            }
             (false, _) => "; the prior of its parameters was widened".to_owned(),
             (true, Some(ratio)) => format!("; the fit assumes {ratio:.1} times the earlier σ"),
             (true, None) => String::new(),
         };
-        let cause = match (nearest, index) {
-            _ if self.noise_ratio.is_some() => {
-                let nearest = nearest.map_or_else(String::new, |of| {
-                    format!(" ({} comes nearest; its prior was widened)", of.label)
-                });
-                format!("no change that was tried explains them{nearest}, only {}", self.label)
-            }
-            (_, index) => {
-                let still = if index == 0 { "" } else { "with that, they still do; " };
-                let probability = 100.0 * self.probability;
-                format!(
-                    "{still}most probable of the changes tried: {} ({probability:.0} %)",
-                    self.label
-                )
-            }
+        let still = if index == 0 { "" } else { "with that, they still do; " };
+        let cause = if self.noise_ratio.is_some() {
+            let what = if index == 0 { "them" } else { "the rest" };
+            format!("{still}no change that was tried explains {what} as well as {}", self.label)
+        } else {
+            let probability = 100.0 * self.probability;
+            format!(
+                "{still}most probable of the changes tried: {} ({probability:.0} %)",
+                self.label
+            )
         };
         let text = format!(
             "the new rows contradict {} (a false alarm in at most one of 100 fits); \
@@ -109,13 +110,9 @@ impl Contradiction {
     }
 }
 
-/// Returns the findings that new rows contradict the prior in `file`, in the order of the `causes`.
-/// Causes before larger noise do not explain the rows, so one finding stands for all of them.
+/// Returns the findings that new rows contradict the prior in `file`, one for each of the `causes`.
 pub(super) fn findings(causes: &[Contradiction], file: &Path) -> Vec<Finding> {
-    let noise = causes.iter().position(|cause| cause.noise_ratio.is_some()).unwrap_or(0);
-    let later = causes.iter().enumerate().skip(noise);
-    let nearest = causes[..noise].first();
-    later.map(|(k, cause)| cause.finding(k, nearest.filter(|_| k == noise), file)).collect()
+    causes.iter().enumerate().map(|(k, cause)| cause.finding(k, file)).collect()
 }
 
 /// Rewrites findings on a fit that a contradicted prior in `file` forces: they say nothing of table,
@@ -127,8 +124,11 @@ pub(super) fn attribute_to_prior(findings: &mut [Finding], file: &Path, chi2: Op
     for finding in findings {
         match finding.code {
             FindingCode::BeyondPrior => {
-                finding.text =
-                    format!("the new rows contradict the prior {}{chi2}", file.display());
+                finding.text = format!(
+                    "the new rows contradict the prior {}{chi2}: {}",
+                    file.display(),
+                    finding.text
+                );
                 "these rows are of another arm, or it has changed; fit without --prior"
                     .clone_into(&mut finding.remedy);
             }
@@ -157,6 +157,8 @@ pub(super) fn most_probable(
     let cause = &causes[first.cause];
     let size = |i: usize| first.sizes[i].max(first.mean[i].abs());
     let is_held = extended.is_held(cause);
+    let is_part_held = cause.kind == CauseKind::Two
+        && cause.terms.iter().flatten().any(|&(k, _)| k >= extended.declared);
     let sizes: Vec<f64> = (0..first.sizes.len()).map(size).collect();
     let instead = is_held.then(|| extended.free_instead(cause, &sizes, rows)).flatten();
     let (instead, widened) = if let Some((label, widened)) = instead {
@@ -179,6 +181,7 @@ pub(super) fn most_probable(
         widened,
         relocated: None,
         is_held,
+        is_part_held,
         instead,
         noise_ratio: (cause.kind == CauseKind::Noise).then(|| first.mean[0]),
     })

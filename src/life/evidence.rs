@@ -14,7 +14,7 @@
 //! the arm is unchanged, and so is a mixture of such ratios. The mixture exceeds 1/α at any time
 //! with a probability of at most α [Ville 1939; Grünwald, de Heide & Koolen 2024].
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::rows::{SensitiveRows, Sums};
 
@@ -102,6 +102,28 @@ impl Unchanged {
         sizes: &[f64],
     ) -> Option<(f64, DVector<f64>, DMatrix<f64>)> {
         let n = columns.len();
+        let (solved, pull, mean) = self.solved(columns, sizes)?;
+        let ln_det: f64 = solved.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
+        let ratio = 0.5 * (pull.dot(&mean) - ln_det);
+        let inverse = solved.inverse();
+        let covariance = DMatrix::from_fn(n, n, |i, j| sizes[i] * inverse[(i, j)] * sizes[j]);
+        Some((ratio, DVector::from_fn(n, |i, _| sizes[i] * mean[i]), covariance))
+    }
+
+    /// Returns the posterior mean of the amplitudes as [`likelihood_ratio`](Self::likelihood_ratio)
+    /// does, without the rest.
+    pub fn mean(&self, columns: &[usize], sizes: &[f64]) -> Option<DVector<f64>> {
+        let (_, _, mean) = self.solved(columns, sizes)?;
+        Some(DVector::from_fn(columns.len(), |i, _| sizes[i] * mean[i]))
+    }
+
+    /// Returns the Cholesky decomposition of I + D A D, the vector D b, and (I + D A D)⁻¹ D b.
+    fn solved(
+        &self,
+        columns: &[usize],
+        sizes: &[f64],
+    ) -> Option<(Cholesky<f64, Dyn>, DVector<f64>, DVector<f64>)> {
+        let n = columns.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| {
             sizes[i] * self.information[(columns[i], columns[j])] * sizes[j]
                 + f64::from(u8::from(i == j))
@@ -109,11 +131,7 @@ impl Unchanged {
         let pull = DVector::from_fn(n, |i, _| sizes[i] * self.vector[columns[i]]);
         let solved = scaled.cholesky()?;
         let mean = solved.solve(&pull);
-        let ln_det: f64 = solved.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
-        let ratio = 0.5 * (pull.dot(&mean) - ln_det);
-        let inverse = solved.inverse();
-        let covariance = DMatrix::from_fn(n, n, |i, j| sizes[i] * inverse[(i, j)] * sizes[j]);
-        Some((ratio, DVector::from_fn(n, |i, _| sizes[i] * mean[i]), covariance))
+        Some((solved, pull, mean))
     }
 
     /// Returns ln LR of the density `other` of the same rows against this one.

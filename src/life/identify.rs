@@ -145,6 +145,7 @@ pub(super) fn identified(
         let is_new_cause = cause.as_ref().is_some_and(|cause: &Contradiction| {
             causes.iter().all(|earlier: &Contradiction| earlier.label != cause.label)
         });
+        let is_noise = cause.as_ref().is_some_and(|cause| cause.noise_ratio.is_some());
         let cause = cause.filter(|_| is_new_cause && causes.len() < MAX_CAUSES);
         let Some(cause) = cause else {
             causes.extend(contradicting_bound(&model, &found, &original));
@@ -169,6 +170,7 @@ pub(super) fn identified(
                 chi2,
                 causes: labels,
                 has_raised_sigma,
+                is_unexplained: is_noise,
                 ..compare(&model, &found, (&original, &prior))
             });
             return Ok(Identified { found, data, since });
@@ -228,6 +230,7 @@ fn contradicting_bound(
         widened: Vec::new(),
         relocated: None,
         is_held: false,
+        is_part_held: false,
         instead: None,
         noise_ratio: None,
     })
@@ -429,6 +432,7 @@ fn compare(
         chi2: None,
         causes: Vec::new(),
         has_raised_sigma: false,
+        is_unexplained: false,
         parameters: original.indices.iter().enumerate().map(compared).collect(),
     }
 }

@@ -12,9 +12,9 @@ use super::rows::SensitiveRows;
 const MAX_PAIRED_CAUSES: usize = 40;
 
 /// Returns the assessment with the pairs of `causes`, if the pairs together are nine times as
-/// probable as all single causes, alone or with larger noise, and unchanged otherwise: what a model
-/// lacks looks like noise, and a second cause would fit a part of it. The pairs are appended to
-/// `causes`.
+/// probable as all single causes, alone or with larger noise: what a model lacks looks like noise,
+/// and a second cause would fit a part of it. The pairs are appended to `causes`. Otherwise no pair
+/// is listed, and their probability is subtracted from that of the single causes.
 ///
 /// All pairs have the prior odds [`SECOND_CHANGE_ODDS`] together, and each pair has a share in
 /// proportion to the product of the prior probabilities of its causes. The evidence for a change, and
@@ -58,7 +58,8 @@ pub(super) fn with_pairs(
     let others = ln_sum(with_noise.chain([assessment.ln_sum]));
     let odds = MIN_NAMED_PROBABILITY / (1.0 - MIN_NAMED_PROBABILITY);
     if of_pairs < others + odds.ln() {
-        return Some(assessment);
+        let part = (others - ln_sum([others, of_pairs])).exp();
+        return Some(assessment.scaled(part));
     }
     let sum = ln_sum([assessment.ln_sum, of_pairs]);
     let assessed = found.into_iter().map(|(cause, weighted)| AssessedCause {
@@ -66,10 +67,8 @@ pub(super) fn with_pairs(
         ..weighted.assessed(cause, 0)
     });
     let part = (assessment.ln_sum - sum).exp();
-    let single = assessment.causes.iter().cloned();
-    let single =
-        single.map(|cause| AssessedCause { probability: part * cause.probability, ..cause });
-    let mut all: Vec<AssessedCause> = single.chain(assessed).collect();
+    let assessment = assessment.scaled(part);
+    let mut all: Vec<AssessedCause> = assessment.causes.into_iter().chain(assessed).collect();
     all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     causes.extend(pairs);
     Some(Assessment { causes: all, ln_sum: sum, ..assessment })

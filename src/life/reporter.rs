@@ -12,6 +12,11 @@ use crate::quantity::Unit;
 
 /// Maximum number of groups of rows that are left out in turn to test a cause.
 const MAX_GROUPS: usize = 60;
+/// Smallest of these maxima: with many unknowns, fewer groups are left out.
+const MIN_GROUPS: usize = 10;
+/// Maximum number of operations of the solutions without each group: cubes of the number of
+/// unknowns.
+const MAX_OPERATIONS: f64 = 6e8;
 /// Smallest expected evidence per pose for one cause against another \[nats\] at which more poses
 /// can distinguish the causes.
 const MIN_NATS_PER_POSE: f64 = 1e-3;
@@ -183,13 +188,15 @@ impl Reporter<'_> {
         let sizes = [&*assessed.sizes, &unknown, &vec![1.0; carried.len()]].concat();
         let factor = DMatrix::zeros(rows.sensitivity.ncols(), 1);
         let sums = sums_of(rows, 1.0);
-        let groups = rows.len().min(MAX_GROUPS);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive")]
+        let fitting = (MAX_OPERATIONS / (columns.len() as f64).powi(3)) as usize;
+        let groups = rows.len().min(fitting.clamp(MIN_GROUPS, MAX_GROUPS));
         let means: Option<Vec<DVector<f64>>> = (0..groups)
             .map(|group| {
                 let mut others = sums.clone();
                 (group..rows.len()).step_by(groups).for_each(|row| others.add(rows, row, -1.0));
                 let unchanged = Unchanged::new(&others, &factor)?;
-                Some(unchanged.likelihood_ratio(&columns, &sizes)?.1)
+                unchanged.mean(&columns, &sizes)
             })
             .collect();
         let means = means?;

@@ -82,13 +82,10 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
             Some(_) => ". That is improbable, but no single cause explains it.".to_owned(),
             None => ". Their agreement could not be tested.".to_owned(),
         },
-        [nearest, .., _] if comparison.has_raised_sigma => {
+        [noise] if comparison.has_raised_sigma => {
             format!(
-                ". They disagree, and no change that was tried explains that ({nearest} comes nearest)."
+                ". They disagree, and no change that was tried explains that as well as {noise}."
             )
-        }
-        _ if comparison.has_raised_sigma => {
-            ". They disagree, and no change that was tried explains that.".to_owned()
         }
         causes => {
             // χ² counts all coordinates alike, so that a small change of one kind may leave it as
@@ -104,10 +101,13 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
     text + &verdict
 }
 
-/// Returns true if the new rows contradict the prior of a fit, and no change that was tried explains
-/// that.
+/// Returns true if the new rows contradict the prior of a fit, and neither a change that was tried nor
+/// larger noise explains that.
 pub fn is_prior_contradicted(found: &Identification) -> bool {
-    found.prior.as_ref().is_some_and(|prior| prior.has_raised_sigma)
+    found
+        .prior
+        .as_ref()
+        .is_some_and(|prior| prior.is_unexplained || prior.has_raised_sigma && !found.is_trusted())
 }
 
 /// States that the new rows contradict the earlier estimate; `None` if they do not.

@@ -318,6 +318,17 @@ fn the_command_has_exit_status_3_for_a_changed_arm() {
         cells.join(",")
     });
     folder.write("moved.csv", moved.collect::<Vec<_>>().join("\n") + "\n");
+    // Metres in columns of millimetres are another table, not another arm.
+    let metres = text.lines().map(|line| {
+        let cells = line.split(',').enumerate().map(|(k, cell)| match cell.parse::<f64>() {
+            Ok(at) if (place - 2..=place).contains(&k) => (at / 1e3).to_string(),
+            _ => cell.to_owned(),
+        });
+        cells.collect::<Vec<_>>().join(",")
+    });
+    folder.write("metres.csv", metres.collect::<Vec<_>>().join("\n") + "\n");
+    let misread = folder.flexcal(&format!("{run} --data metres.csv")).code(1);
+    assert_contains(&misread.stdout, &["Not judged: ", "Next: correct the table"]);
     let changed = folder.flexcal(&format!("{run} --data moved.csv")).code(3);
     assert_contains(&changed.stdout, &["Changed, seen after", "Next: flexcal identify"]);
     // The suggested command leaves the estimate that is its prior where it is.
