@@ -172,17 +172,19 @@ impl Problem {
                     .with_strategy(strategy)
                     .with_solver(solver)
                     .with_progress(sink);
-                if let Some(prior) = prior {
+                let (mut found, fitted) = if let Some(prior) = prior {
                     let updated = update(&problem, &data, &options, &prior, drift_days)?;
-                    return Ok((updated.found, updated.predictions));
-                }
-                let mut found = fit::identify(&problem, &data, &options)?;
-                let fitted = match (remainder, declared) {
-                    (true, _) => remainder::fit(&found, &problem, &data)?,
-                    (false, Some(declared)) => remainder::uncertainty(&found, &problem, &data)?
-                        .map(|fitted| fitted.with_declared(declared, (&found, &problem), &data))
-                        .transpose()?,
-                    (false, None) => None,
+                    (updated.found, updated.predictions)
+                } else {
+                    let found = fit::identify(&problem, &data, &options)?;
+                    let fitted = match (remainder, declared) {
+                        (true, _) => remainder::fit(&found, &problem, &data)?,
+                        (false, Some(declared)) => remainder::uncertainty(&found, &problem, &data)?
+                            .map(|fitted| fitted.with_declared(declared, (&found, &problem), &data))
+                            .transpose()?,
+                        (false, None) => None,
+                    };
+                    (found, fitted)
                 };
                 if let Some(fitted) = &fitted {
                     fitted.judge_held_out(&mut found);

@@ -109,7 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         };
         let poses = data.measurements.pose_numbers(&problem);
         let mut fitted: Vec<usize> =
-            data.split.identification.iter().map(|&row| poses[row]).collect();
+            data.split.identification.iter().filter_map(|&row| poses.get(row).copied()).collect();
         fitted.sort_unstable();
         fitted.dedup();
         let fit = (&closure.before.fit, fitted.len());

@@ -139,8 +139,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let next = match (&arguments.estimate, &estimate) {
             _ if let Some(&first) = lost.first() => format!(
-                "correct the loads (payload_kg, hoist_N) of {} rows without equilibrium, the first at {}, then the same command",
-                lost.len(),
+                "correct the loads (payload_kg, hoist_N) of {} without equilibrium, the first at {}, then the same command",
+                if lost.len() == 1 { "1 row".to_owned() } else { format!("{} rows", lost.len()) },
                 rows.location(first)
             ),
             (Some(file), _) if fitted.is_empty() && test.is_some_and(|of| of.is_contradicted()) => format!(

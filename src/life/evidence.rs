@@ -102,7 +102,8 @@ impl Unchanged {
         sizes: &[f64],
     ) -> Option<(f64, DVector<f64>, DMatrix<f64>)> {
         let n = columns.len();
-        let (solved, pull, mean) = self.solved(columns, sizes)?;
+        let (solved, pull) = self.solved(columns, sizes)?;
+        let mean = solved.solve(&pull);
         let ln_det: f64 = solved.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
         let ratio = 0.5 * (pull.dot(&mean) - ln_det);
         let inverse = solved.inverse();
@@ -113,25 +114,24 @@ impl Unchanged {
     /// Returns the posterior mean of the amplitudes as [`likelihood_ratio`](Self::likelihood_ratio)
     /// does, without the rest.
     pub fn mean(&self, columns: &[usize], sizes: &[f64]) -> Option<DVector<f64>> {
-        let (_, _, mean) = self.solved(columns, sizes)?;
+        let (solved, pull) = self.solved(columns, sizes)?;
+        let mean = solved.solve(&pull);
         Some(DVector::from_fn(columns.len(), |i, _| sizes[i] * mean[i]))
     }
 
-    /// Returns the Cholesky decomposition of I + D A D, the vector D b, and (I + D A D)⁻¹ D b.
+    /// Returns the Cholesky decomposition of I + D A D, and the vector D b.
     fn solved(
         &self,
         columns: &[usize],
         sizes: &[f64],
-    ) -> Option<(Cholesky<f64, Dyn>, DVector<f64>, DVector<f64>)> {
+    ) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
         let n = columns.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| {
             sizes[i] * self.information[(columns[i], columns[j])] * sizes[j]
                 + f64::from(u8::from(i == j))
         });
         let pull = DVector::from_fn(n, |i, _| sizes[i] * self.vector[columns[i]]);
-        let solved = scaled.cholesky()?;
-        let mean = solved.solve(&pull);
-        Some((solved, pull, mean))
+        Some((scaled.cholesky()?, pull))
     }
 
     /// Returns ln LR of the density `other` of the same rows against this one.

@@ -14,8 +14,8 @@ use crate::model::{Model, Pose};
 /// Evidence \[nats\] by which a placement that is located anew must exceed all small changes
 /// together: each of its six coordinates is located to about 1 % of the range of plausible moves.
 pub(super) const MIN_RELOCATION_NATS: f64 = 28.0;
-/// Largest ratio of the errors after a base, camera or marker is located anew to those before at which it
-/// counts as moved, though the rows show another change too.
+/// Largest ratio of the errors after a base, camera or marker is located anew to those before at
+/// which it counts as moved, though the rows show another change too.
 const MAX_REGISTERED_ERROR: f64 = 0.05;
 /// Largest root mean square error after it is located anew, in units of the noise, at which it
 /// counts as moved beside another change: more than that is read wrongly.
@@ -41,8 +41,8 @@ pub(super) struct Placed {
 
 impl Placed {
     /// Returns the move of the placement from the full parameter vector `before` to `after`: the
-    /// shift \[m\], and the rotation vector of the turn \[rad\], both in the frame in which the pose is
-    /// declared. Differences of rotation vectors are no turns.
+    /// shift \[m\], and the rotation vector of the turn \[rad\], both in the frame in which the
+    /// pose is declared. Differences of rotation vectors are no turns.
     pub fn moved(&self, model: &Model, before: &DVector<f64>, after: &DVector<f64>) -> Vec<f64> {
         let pose = |x: &DVector<f64>| -> Vec<f64> {
             self.parameters.iter().map(|&k| model.parameters[k].value(x[k])).collect()
@@ -159,8 +159,8 @@ pub(super) struct LocatedAnew {
 }
 
 impl LocatedAnew {
-    /// Returns the probability of the move, and the gain by it alone \[nats\]: half of the decrease of
-    /// χ², less that of its coordinates. `None` unless the move explains the rows: there is no
+    /// Returns the probability of the move, and the gain by it alone \[nats\]: half of the decrease
+    /// of χ², less that of its coordinates. `None` unless the move explains the rows: there is no
     /// evidence above `threshold` for another change, or the errors are a small fraction of those
     /// before, so that this has moved whatever else changed, and both changes explain the rows
     /// better than all small ones. `small` holds χ² of the unchanged arm and ln of the evidence for

@@ -79,18 +79,21 @@ const MIN_REMARKED_SIGMAS: f64 = 3.0;
 /// Smallest identified share of a parameter that is remarked.
 const MIN_REMARKED_SHARE: f64 = 0.25;
 
-/// States which angle or length of a joint deviates most for its prior, with the whole deviation of
-/// all parameters that act alike. `None` if no deviation is remarkable.
+/// States which angle or length of a joint deviates most for its prior, and the whole deviation if
+/// others act alike. `None` if no deviation is remarkable.
 fn farthest_for_its_prior(found: &Identification) -> Option<String> {
     let farthest = found.estimates.iter().filter_map(|estimate| {
-        let is_of_joint = estimate.name.starts_with("joint") && !estimate.unit.is_relative();
+        // Names of effects begin with "joint-".
+        let rest = estimate.name.strip_prefix("joint")?;
+        let is_of_joint =
+            rest.starts_with(|c: char| c.is_ascii_digit()) && !estimate.unit.is_relative();
         let sigma = estimate.prior_sigma.filter(|_| is_of_joint)?;
         let share = Some(estimate.identified).filter(|share| *share >= MIN_REMARKED_SHARE)?;
         let deviation = estimate.estimate - estimate.nominal;
-        Some((estimate, deviation / share, deviation.abs() / (sigma * share.sqrt())))
+        Some((estimate, share, deviation.abs() / (sigma * share.sqrt())))
     });
     let farthest = farthest.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let (estimate, whole, sigmas) = farthest;
+    let (estimate, share, sigmas) = farthest;
     let alike: Vec<String> = found
         .strong_correlations()
         .into_iter()
@@ -101,17 +104,18 @@ fn farthest_for_its_prior(found: &Identification) -> Option<String> {
         })
         .collect();
     let unit = estimate.unit.display(estimate.nominal);
-    let alike = if alike.is_empty() {
+    let deviation = estimate.estimate - estimate.nominal;
+    let shown = |of: f64| format!("{} {}", two_digits(of * unit.factor, 3), unit.symbol);
+    let shared = if alike.is_empty() {
         String::new()
     } else {
-        format!(", or {} that acts alike,", alike.join(" or "))
+        format!("; with {}, acting alike, {} in all", alike.join(" and "), shown(deviation / share))
     };
     (sigmas > MIN_REMARKED_SIGMAS).then(|| {
         format!(
-            "farthest from nominal for its prior: {}{alike} by {} {} ({} σ)",
+            "farthest from nominal for its prior: {} by {} ({} σ of its estimate{shared})",
             estimate.name,
-            two_digits(whole * unit.factor, 3),
-            unit.symbol,
+            shown(deviation),
             number(sigmas, 1)
         )
     })

@@ -10,6 +10,7 @@ use super::figures::{ACCENT, Drawing, Forest};
 use super::render::Story;
 use crate::fit::SavedEstimate;
 use crate::numeric::{Interval, mean_interval};
+use crate::observation::FixtureKind;
 use crate::quantity::Unit;
 use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash, p_value};
 
@@ -19,6 +20,17 @@ const FALSE_ALARM_PROBABILITY: f64 = 0.01;
 /// Smallest eigenvalue of the correlation matrix of the differences, relative to the number of
 /// parameters, at which its direction is tested. Below it rounding decides.
 const MIN_EIGENVALUE: f64 = 1e-12;
+/// Smallest eigenvalue that a direction counts with. A combination known still better differs by
+/// what linear errors of parameters known far worse leave out.
+const EIGENVALUE_FLOOR: f64 = 1e-6;
+/// Kinds of fixtures, one for each word that begins names of parameters.
+const FIXTURES: [FixtureKind; 5] = [
+    FixtureKind::Point,
+    FixtureKind::Anchor,
+    FixtureKind::Plane,
+    FixtureKind::Camera,
+    FixtureKind::Marker,
+];
 /// Maximum number of parameters that the terminal lists.
 const MAX_LISTED: usize = 20;
 /// Smallest number of common configurations at which the held-out errors of both results are
@@ -199,8 +211,9 @@ fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
     found
 }
 
-/// Tests whether all common parameters together differ: χ² = dᵀ (C_A + C_B)⁻¹ d with d = b − a,
-/// its degrees of freedom and its p-value. Well determined combinations of parameters count, which
+/// Tests whether all common parameters of the arm together differ: χ² = dᵀ (C_A + C_B)⁻¹ d with
+/// d = b − a, its degrees of freedom and its p-value. Bases, tools and fixtures do not count: they
+/// may be set up anew. Well determined combinations of parameters count, which
 /// the single standard errors hide. Rows that both fits use make the test too lenient. `None` if no
 /// parameter has a variance in both.
 fn joint_test([a, b]: [&SavedEstimate; 2]) -> Option<(f64, f64, f64)> {
@@ -210,7 +223,7 @@ fn joint_test([a, b]: [&SavedEstimate; 2]) -> Option<(f64, f64, f64)> {
         .entries()
         .enumerate()
         .filter_map(|(k, (name, value, _))| {
-            let index = of_b.iter().position(|entry| entry.0 == name)?;
+            let index = of_b.iter().position(|entry| entry.0 == name && !is_set_up(name))?;
             let sigma = (in_a[(k, k)] + in_b[(index, index)]).sqrt();
             (sigma > 0.0).then_some((k, index, of_b[index].1 - value, sigma))
         })
@@ -229,10 +242,19 @@ fn joint_test([a, b]: [&SavedEstimate; 2]) -> Option<(f64, f64, f64)> {
     let kept = eigen.eigenvalues.iter().zip(&along);
     let kept: Vec<f64> = kept
         .filter(|(value, _)| **value > MIN_EIGENVALUE * n as f64)
-        .map(|(value, along)| along * along / value)
+        .map(|(value, along)| along * along / value.max(EIGENVALUE_FLOOR))
         .collect();
     let (chi2, freedom) = (kept.iter().sum::<f64>(), kept.len() as f64);
     Some((chi2, freedom, ChiSquared::new(freedom).ok()?.sf(chi2)))
+}
+
+/// Returns true if a parameter of this name belongs to a base, a tool or a fixture.
+fn is_set_up(name: &str) -> bool {
+    let word = name.split(['.', '[']).next().unwrap_or_default();
+    // A beam may be named "base", too.
+    let is_placed = |end: &str| ["x", "y", "z", "rx", "ry", "rz"].contains(&end);
+    (["base", "tool"].contains(&word) && name.rsplit('.').next().is_some_and(is_placed))
+        || FIXTURES.iter().any(|kind| kind.word() == word)
 }
 
 /// States whether the estimates differ by more than their standard errors allow. `tested` is the
@@ -274,13 +296,14 @@ fn verdict(
              combinations of them{together}."
         ),
         0 if shared > 0 => format!(
-            "No difference is shown, of single parameters ({most}; {test}) or of all together{together}. \
+            "No difference is shown, of single parameters ({most}; {test}) or of all of the arm \
+             together{together}. \
              That does not show that they agree: both fits use {}, so these errors are too large.",
             counted(shared, "common row")
         ),
         0 => format!(
-            "No difference is shown, of single parameters ({most}; {test}) or of all \
-             together{together}."
+            "No difference is shown, of single parameters ({most}; {test}) or of all of \
+             the arm together{together}."
         ),
         count => format!(
             "They differ: {} by more than the errors allow ({most}; {test}).",
@@ -338,8 +361,14 @@ fn held_out_sentence(sides: &[Side; 2]) -> Option<String> {
 /// than [`MAX_NOMINAL_SIGMAS`] σ of the prior.
 fn are_two_arms(a: &SavedEstimate, b: &SavedEstimate) -> bool {
     let is_apart = |(name, _, sigma): (&str, f64, Option<f64>)| {
+        let symbol = a.unit_of(name).unwrap_or_default();
+        // The prior of a stiffness is that of the logarithm of its ratio to the nominal value.
+        let is_relative = STIFFNESS_UNITS.iter().any(|unit| unit.symbol() == symbol);
         let nominal = a.nominal_of(name).zip(b.nominal_of(name));
-        nominal.zip(sigma).is_some_and(|((a, b), sigma)| (a - b).abs() > MAX_NOMINAL_SIGMAS * sigma)
+        nominal.zip(sigma).is_some_and(|((a, b), sigma)| {
+            let change = if is_relative { (a / b).ln() } else { a - b };
+            change.abs() > MAX_NOMINAL_SIGMAS * sigma
+        })
     };
     a.problem_name() != b.problem_name() && a.entries().any(is_apart)
 }

@@ -40,8 +40,8 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let [without, with] = [gain.without, gain.with].map(|error| number(error * 1e3, 4));
     match after {
         Some(_) => format!(
-            "A remainder (smooth correction) at {} is kept, because it improves the prediction of poses left out of its fit: the mean \
-             error of left-out configurations falls from {without} mm to {with} mm{held_out}.",
+            "A remainder (smooth correction) at {} is kept: the mean error of left-out \
+             configurations falls from {without} mm to {with} mm{held_out}.",
             counted(outcome.joints, "joint"),
             held_out = if found.fitted.is_left_out {
                 String::new()

@@ -193,8 +193,8 @@ fn verdict(watch: &Watch) -> String {
     format!("Changed, seen after {}: {what}", counted(row, "row"))
 }
 
-/// Returns the lines of a cause in the table of causes. Each change of two causes together has a line
-/// of its own.
+/// Returns the lines of a cause in the table of causes. Each change of two causes together has a
+/// line of its own.
 fn lines(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<Vec<String>> {
     let largest = cause.kind.largest_ratio().zip(cause.changes.last());
     let is_at_end = largest.is_some_and(|(largest, last)| last.change >= largest);
@@ -221,8 +221,8 @@ fn lines(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<Vec<Stri
 }
 
 /// Formats a change with its standard error; the name is the part of the parameter's name after the
-/// last dot, or the whole name where two causes changed. A turn has no standard error. Neither has a ratio of the noise: it is the best of some
-/// trial values, the largest one if `is_largest`.
+/// last dot, or the whole name where two causes changed. A turn has no standard error. Neither has a
+/// ratio of the noise: it is the best of some trial values, the largest one if `is_largest`.
 fn change(kind: CauseKind, change: &Change, is_largest: bool) -> String {
     let (factor, symbol) = if change.unit.is_relative() {
         (100.0, "%".to_owned())

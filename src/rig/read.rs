@@ -256,7 +256,12 @@ fn deviation(
         return Err(item.error(InputErrorKind::NotPositive { value }));
     }
     let is_nominal = (value - parameter.nominal).abs() <= ROUNDING * parameter.nominal.abs();
-    if !parameter.unit.is_relative() && value != 0.0 && is_nominal {
+    let largest = match parameter.unit {
+        Unit::Length => MAX_PLAIN_DEVIATION,
+        Unit::Angle => MAX_PLAIN_TURN,
+        _ => 0.0,
+    };
+    if !parameter.unit.is_relative() && is_nominal && value.abs() > largest {
         return Err(item.error(InputErrorKind::AbsoluteDeviation));
     }
     Ok(Deviation { name: name.to_owned(), value })
@@ -264,6 +269,10 @@ fn deviation(
 
 /// Largest relative difference of two equal numbers.
 const ROUNDING: f64 = 1e-9;
+/// Largest deviation of a length that may equal its nominal value by chance \[m\].
+const MAX_PLAIN_DEVIATION: f64 = 0.01;
+/// Largest deviation of an angle that may equal its nominal value by chance \[rad\].
+const MAX_PLAIN_TURN: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
 /// Reads a rule for random values, for example `"joint*.alpha" = { sigma_deg = 0.3 }`.
 fn random(

@@ -234,5 +234,8 @@ fn suggested_commands_name_the_measurements_of_the_fit() {
         &rigid.stderr,
         &["strategy rigid ignores the elasticity that the problem declares"],
     );
-    assert_contains(&rigid.stdout, &["Next: flexcal identify . fits the elasticity"]);
+    assert_contains(
+        &rigid.stdout,
+        &["Next: flexcal identify . fits all parameters at once, elasticity included"],
+    );
 }

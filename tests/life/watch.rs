@@ -61,11 +61,14 @@ fn misfit_that_repeats_with_the_pose_is_no_change() {
     }
 }
 
+/// Mistake in a table.
+type Mistake = fn(&mut Measurements);
+
 #[test]
 fn a_misread_table_is_named_before_a_change() {
     let bench = Bench::new();
     let (arm, estimate) = calibrated(&bench, 2);
-    let mistakes: [(fn(&mut Measurements), &str); 2] = [
+    let mistakes: [(Mistake, &str); 2] = [
         (|rows| rows.positions.iter_mut().for_each(|at| *at *= 1e-3), "positions that are metres"),
         (
             |rows| {

@@ -304,13 +304,34 @@ fn an_acceptance_lists_the_joint_table_too() {
 }
 
 #[test]
+fn a_true_value_is_no_deviation_unless_both_are_small() {
+    let simulate = "simulate arm --truth arm/TRUTH.toml --poses 9 --seed 2 --out new";
+    for (nominal, deviation, is_refused) in [("0.4", 400, true), ("0.005", 5, false)] {
+        let bench = bench();
+        bench.map("arm/problem.toml", |text| {
+            text.replace("[0.5, 0, 0]", &format!("[{nominal}, 0, 0]"))
+        });
+        bench.map("arm/TRUTH.toml", |text| {
+            format!("[parameters]\n'tool.x' = {{ mm = {deviation} }}\n{text}")
+        });
+        if is_refused {
+            assert_refused(&bench, simulate, ".", &["write the deviation from nominal"]);
+        } else {
+            bench.flexcal(simulate).success();
+        }
+    }
+}
+
+#[test]
 fn check_and_next_know_the_joint_table() {
     let bench = bench();
     let problem = crate::common::arms::path("problems/bench-arm/two-tables");
     bench.flexcal(&format!("check {} --out checked", problem.display())).success();
     assert!(bench.json("checked/check.json")["poses"].as_u64() > Some(20));
     let run = bench.flexcal(&format!("next {} --poses 2 --out next", problem.display())).success();
-    assert_contains(&run.stdout, &["append them to the measurements and to the joint table"]);
+    let step =
+        "append them to the measurements and, unless these hold the joints, to the joint table";
+    assert_contains(&run.stdout, &[step]);
 }
 
 #[test]

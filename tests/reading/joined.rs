@@ -90,7 +90,9 @@ fn the_two_tables_may_have_different_decimal_marks() {
     // Points that may separate thousands are refused, with a way out.
     let doubtful = "Point\tX\tY\tZ\nP1\t100.500\t2.250\t3\nP2\t110.500\t4.250\t6\n";
     let error = read("", doubtful, LOG).unwrap_err();
-    assert_says(&error, &["tracker.txt:2: column X: \"100.500\"", "a table with commas between"]);
+    let words =
+        "write the number with a comma and without thousands separators, or correct decimal";
+    assert_says(&error, &["tracker.txt:2: column X: \"100.500\"", words]);
     let mixed = tabs.replace("4.25", "4,25");
     assert_says(&read("", &mixed, LOG).unwrap_err(), &["\"1000.5\" has a decimal point"]);
 }

@@ -52,8 +52,8 @@ pub enum Stage {
 pub struct StageErrors {
     /// Stage of the calibration.
     pub stage: Stage,
-    /// Errors measured − predicted of the held-out rows, measuring frame: positions \[m\], tilts \[rad\],
-    /// images [px].
+    /// Errors measured − predicted of the held-out rows, measuring frame: positions \[m\], tilts
+    /// \[rad\], images [px].
     pub errors: Vec<Vector3<f64>>,
 }
 
