@@ -94,7 +94,7 @@ impl Common {
         if joints.is_empty() { data } else { format!("{data} --joints{}", joints.concat()) }
     }
 
-    /// Reads the problem, with the joint tables of `--joints` instead of its own.
+    /// Reads the problem, with the joint tables of `--joints` instead of those it names.
     pub fn read_problem(&self) -> Result<Problem, Box<dyn Error>> {
         let mut problem = Problem::read(self.problem())?;
         if !self.joints.is_empty() {

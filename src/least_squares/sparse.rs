@@ -156,10 +156,10 @@ mod tests {
 
     /// Returns `rows` rows of each session, [J r], with the unknowns of the sessions first.
     fn rows_of_sessions(rows: usize) -> DMatrix<f64> {
-        let (own, shared, sessions) = SIZES;
-        let n = own * sessions + shared;
+        let (each, shared, sessions) = SIZES;
+        let n = each * sessions + shared;
         DMatrix::from_fn(rows * sessions, n + 1, |i, j| {
-            let is_involved = j >= own * sessions || j / own == i / rows;
+            let is_involved = j >= each * sessions || j / each == i / rows;
             f64::from(u8::from(is_involved)) * (1.7 * i as f64 + 0.3 * (j * j % 101) as f64).sin()
         })
     }
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn rows_of_sessions_keep_the_factor_sparse() {
-        let (own, shared, sessions) = SIZES;
+        let (each, shared, sessions) = SIZES;
         let matrix = rows_of_sessions(5);
         let n = matrix.ncols() - 1;
         let mut triangle = Triangle::new(n);
@@ -187,7 +187,7 @@ mod tests {
         let error = factor.triangle.tr_mul(&factor.projected) - gram.view((0, n), (n, 1));
         assert!(error.amax() < 1e-13 * gram.amax());
         let filled = factor.triangle.iter().filter(|value| **value != 0.0).count();
-        assert!(filled <= sessions * own * (own + shared) + shared * shared, "{filled}");
+        assert!(filled <= sessions * each * (each + shared) + shared * shared, "{filled}");
 
         let vector = matrix.row(12).columns(0, n).transpose();
         let mut solved = vector.clone();

@@ -194,7 +194,7 @@ fn verdict(watch: &Watch) -> String {
 }
 
 /// Returns the lines of a cause in the table of causes. Each change of two causes together has a
-/// line of its own.
+/// separate line.
 fn lines(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<Vec<String>> {
     let largest = cause.kind.largest_ratio().zip(cause.changes.last());
     let is_at_end = largest.is_some_and(|(largest, last)| last.change >= largest);

@@ -278,10 +278,10 @@ fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Vec<(usize, f6
     let misfit = residual.norm_squared() * (1.0 - fit.noise_factor.recip());
     let beyond_free = projected.rows_range(free.len()..);
     let gain = |(column, (index, place)): (usize, (usize, usize))| {
-        let own = triangle.column(free.len() + column);
-        let own = own.rows_range(free.len()..);
-        let (before, after) = (jacobian.column(place).norm_squared(), own.norm_squared());
-        let slope = own.dot(&beyond_free);
+        let part = triangle.column(free.len() + column);
+        let part = part.rows_range(free.len()..);
+        let (before, after) = (jacobian.column(place).norm_squared(), part.norm_squared());
+        let slope = part.dot(&beyond_free);
         (after > MIN_OWN_SHARE * before).then(|| (index, slope * slope / after / misfit))
     };
     let placed = places.iter().enumerate().filter_map(|(index, place)| Some((index, (*place)?)));

@@ -56,9 +56,9 @@ impl View {
     /// distance.
     fn difference(&self, [camera, marker]: &[Isometry3<f64>; 2]) -> f64 {
         let seen = (self.carrier * camera).inverse() * marker;
-        let own = &self.marker_in_camera;
-        let shift = (seen.translation.vector - own.translation.vector).norm();
-        own.rotation.angle_to(&seen.rotation) + shift / own.translation.vector.norm()
+        let located = &self.marker_in_camera;
+        let shift = (seen.translation.vector - located.translation.vector).norm();
+        located.rotation.angle_to(&seen.rotation) + shift / located.translation.vector.norm()
     }
 }
 

@@ -40,7 +40,7 @@ pub fn of(
         for &k in indices {
             without.x[k] = identification.registered_x[k];
         }
-        // A base or a target moves the positions of its own rows alone.
+        // A base or a target moves the positions of its rows alone.
         let is_moved = |place: usize| match indices.iter().map(|&k| parameters[k].site).next() {
             Some(ParameterSite::Base { base, .. }) => setups[place].base == base,
             Some(ParameterSite::Target { target, .. }) => setups[place].target == target,

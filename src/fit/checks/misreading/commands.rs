@@ -23,7 +23,7 @@ pub(super) const TURN_UNITS: [u32; 20] = [
     400, 1000, 1024, 2000, 2048, 2500, 3600, 4000, 4096, 5000, 8000, 8192, 10_000, 16_384, 32_768,
     36_000, 65_536, 131_072, 262_144, 1_048_576,
 ];
-/// Maximum number of joints in a unit of their own of which every subset is tried.
+/// Maximum number of joints in another unit than the rest of which every subset is tried.
 const MAX_SUBSETS: usize = 4;
 /// Maximum number of joints of which every three are tried as exchanged in a ring.
 const MAX_CYCLED: usize = 7;
