@@ -201,7 +201,7 @@ fn fit_rows(
     let unknowns = fitted_parameters(&fitting)?;
     let (start, registered) =
         prepared(&mut fitting, options.warm_start.as_deref(), has_declared_noise)?;
-    let begin = start_of_fit(&mut fitting, &registered, options.begin(model, &start))?;
+    let begin = start_of_fit(&mut fitting, options.begin(model, &start))?;
     let enough = PoseSufficiency::new(&fitting, problem, &unknowns, &start);
     // A few new rows cannot distinguish a larger noise from a change since the earlier data.
     let judged = options.earlier.is_none() && enough.judges_noise(unknowns.len());

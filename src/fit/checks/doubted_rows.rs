@@ -134,7 +134,7 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         .or_else(|| mistaken_joints(fit, &trial.x, &chosen, limit))
         .or_else(stands_elsewhere)
         .or_else(in_other_unit)
-        .or_else(|| of_other_target(fit, &chosen, &kept));
+        .or_else(|| of_other_target(fit, &chosen, &kept).filter(|_| !are_few));
     if cause.is_none() && are_few {
         return None;
     }
@@ -214,22 +214,30 @@ fn other_joint_angles(
         .zip(errors)
         .map(|(&row, error)| (row, table.positions[row] - error))
         .collect();
+    let base_of = |row: usize| fit.fitting.placement.base_of(row);
     let source = |row: &usize| {
         let distance = |of: &&(usize, Vector3<f64>)| (of.1 - table.positions[*row]).norm();
-        let nearest = predicted.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        (nearest.0 != *row && distance(&nearest) < limit)
-            .then(|| nearest.0.cast_signed() - row.cast_signed())
+        let of_base = predicted.iter().filter(|of| base_of(of.0) == base_of(*row));
+        let nearest = of_base.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        (nearest.0 != *row && distance(&nearest) < limit).then_some((*row, nearest.0))
     };
-    let mut shifts: Vec<isize> = chosen.iter().filter_map(source).collect();
-    if shifts.len() < chosen.len().saturating_sub(1).max(2) {
+    let sources: Vec<(usize, usize)> = chosen.iter().filter_map(source).collect();
+    if sources.len() < chosen.len().saturating_sub(1).max(2) {
         return None;
     }
-    shifts.sort_unstable();
-    Some(match (shifts[0], shifts[shifts.len() - 1]) {
-        (-1, -1) => "their positions belong to the joint angles of the row before".to_owned(),
-        (1, 1) => "their positions belong to the joint angles of the row after".to_owned(),
-        _ => "their positions belong to each other's joint angles".to_owned(),
-    })
+    let are_shifted =
+        |by: isize| sources.iter().all(|&(row, of)| row.checked_add_signed(by) == Some(of));
+    let are_exchanged = || {
+        let others: BTreeSet<usize> = sources.iter().map(|&(_, of)| of).collect();
+        others.len() == sources.len() && others.iter().all(|of| chosen.contains(of))
+    };
+    if are_shifted(-1) {
+        Some("their positions belong to the joint angles of the row before".to_owned())
+    } else if are_shifted(1) {
+        Some("their positions belong to the joint angles of the row after".to_owned())
+    } else {
+        are_exchanged().then(|| "their positions belong to each other's joint angles".to_owned())
+    }
 }
 
 /// Returns the words for `chosen` rows that are those of other targets than all rows that are
@@ -239,6 +247,10 @@ fn of_other_target(fit: &CheckedFit, chosen: &[usize], kept: &[usize]) -> Option
     let of =
         |rows: &[usize]| rows.iter().map(|&row| placement.target_of(row)).collect::<BTreeSet<_>>();
     let (apart, others) = (of(chosen), of(kept));
+    // Without declared targets each session has one.
+    if placement.targets == placement.bases {
+        return None;
+    }
     let names: Vec<&str> = apart.iter().map(|&target| placement.targets[target].as_str()).collect();
     apart.is_disjoint(&others).then(|| {
         format!(

@@ -292,14 +292,22 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Returns the median length of the errors of the identification rows at the full parameter vector
-    /// `x`; infinity if most rows cannot be predicted.
+    /// Returns the median length of the errors of the identification rows of the leading kind
+    /// (positions, if there are any) at the full parameter vector `x`; infinity if most rows cannot
+    /// be predicted.
     pub fn typical_error(&self, x: &DVector<f64>) -> f64 {
-        let errors = self.position_errors(&self.split.identification, x);
+        let errors = self.position_errors(&self.leading_rows(), x);
         let length = |norm: f64| if norm.is_nan() { f64::INFINITY } else { norm };
         let mut lengths: Vec<f64> = errors.iter().map(|error| length(error.norm())).collect();
         lengths.sort_by(f64::total_cmp);
         lengths.get(lengths.len() / 2).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// Returns the identification rows of the leading kind (positions, if there are any).
+    pub fn leading_rows(&self) -> Vec<usize> {
+        let leading = self.measurements.leading().kind();
+        let leads = |row: &usize| self.measurements.observation(*row).kind() == leading;
+        self.split.identification.iter().copied().filter(leads).collect()
     }
 
     /// Runs the stages of the strategy from `start`; several stages are repeated in turn until the

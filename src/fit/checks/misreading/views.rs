@@ -16,7 +16,6 @@ use super::images::{is_of_views, of_images};
 use super::reversed::MAX_REVERSED;
 use super::search::{MAX_EXPLAINED_RATIO, Trial, explanations, near_misreadings};
 use crate::error::{InputError, InputErrorKind};
-use crate::fit::Errors;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::nominal_error::MAX_NOMINAL_MISS;
 use crate::fit::checks::row_kind::spread;
@@ -45,7 +44,8 @@ impl CheckedFit<'_> {
     /// for them.
     pub fn explanations(&self) -> &Explanations {
         self.explanations.get_or_init(|| {
-            if is_of_views(self.fitting.measurements) {
+            let has_views = is_of_views(self.fitting.measurements);
+            if has_views && !rows_of_views(self.fitting).is_empty() {
                 explanations_of_views(self)
             } else {
                 explanations(self)
@@ -54,21 +54,20 @@ impl CheckedFit<'_> {
     }
 }
 
-/// Returns the start of a fit of images: `begin`. If the nominal arm, with the errors `registered`,
-/// is far from them, a trial is made first; if it gains too little and stays far from the images,
-/// the fit starts where it ends and is limited to one step, because more would not lead to them.
+/// Returns the start of a fit of images: `begin`. If the nominal arm is far from most of them there,
+/// a trial is made first; if it gains too little and stays far from the images, the fit starts where
+/// it ends and is limited to one step, because more would not lead to them.
 pub(in crate::fit) fn start_of_fit(
     fitting: &mut Fitting,
-    registered: &Errors,
     begin: DVector<f64>,
 ) -> Result<DVector<f64>, StageError> {
-    let (table, rows) = (fitting.measurements, &fitting.split.identification);
+    let (table, rows) = (fitting.measurements, fitting.leading_rows());
     if !is_of_views(table) {
         return Ok(begin);
     }
     let far =
-        MAX_NOMINAL_MISS * spread(fitting.placement, rows, |place| table.positions[rows[place]]);
-    let before = registered.identification.rms.norm;
+        MAX_NOMINAL_MISS * spread(fitting.placement, &rows, |place| table.positions[rows[place]]);
+    let before = fitting.typical_error(&begin);
     if before <= far {
         return Ok(begin);
     }
@@ -76,9 +75,9 @@ pub(in crate::fit) fn start_of_fit(
     fitting.max_steps = Some(limit.map_or(TRIAL_STEPS, |limit| limit.min(TRIAL_STEPS)));
     let end = fitting.run(&begin)?;
     fitting.max_steps = limit;
-    let after = fitting.errors(&end.x).identification.rms.norm;
+    let after = fitting.typical_error(&end.x);
     if after > far.max(MAX_GAINED_RATIO * before) && !end.termination.converged() {
-        fitting.max_steps = Some(1);
+        fitting.max_steps = Some(limit.map_or(1, |limit| limit.min(1)));
         return Ok(end.x);
     }
     Ok(begin)
