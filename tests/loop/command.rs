@@ -217,7 +217,7 @@ fn the_loop_tells_its_story() {
     let found = [
         "Explained",
         "link B bows with temperature",
-        "(gain 0.",
+        "falls by 0.",
         "link-thermal-bending = { link = \"B\" }",
     ];
     assert_contains(&told, &found);
