@@ -97,7 +97,7 @@ def test_watch(arm: Sessions, command: Command) -> None:
 def test_an_earlier_identification_as_prior(arm: Sessions, command: Command) -> None:
     rows = arm.measured(5, 4)
     found = arm.problem.identify(rows, prior=arm.identified, drift_days=7)
-    assert "They agree" in found.summary() and found.to_dict()["prior"]["drift_days"] == 7
+    assert "No contradiction is shown" in found.summary() and found.to_dict()["prior"]["drift_days"] == 7
     of_file = arm.problem.identify(rows, prior=arm.estimate, drift_days=7)
     assert (of_file.parameters["estimate"] == found.parameters["estimate"]).all()
     _, out = command("identify", arm.folder, "--data", rows, "--prior", arm.estimate, "--drift", 7)
