@@ -17,7 +17,7 @@ use super::{advice, diagnostic, values};
 
 /// Arguments of `flexcal watch`.
 #[derive(Debug, Args)]
-#[command(after_help = "Exit status: 0 unchanged, 1 not judged (the table is misread), 3 changed.
+#[command(after_help = "Exit status: 0 unchanged, 3 changed, also if the table may be misread.
 
 Examples:
   flexcal watch problems/lunar-sampler --estimate out/lunar-sampler/estimate.json \\
@@ -164,14 +164,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         };
         format!("{}{}Next: {next}\n", story.text(), results.written())
     })?;
-    Ok(match watch.causes.first() {
-        _ if !watch.is_changed() => Outcome::Done,
-        Some(cause) if cause.kind == CauseKind::Misread => {
-            if !common.prints_text() {
-                diagnostic::warn(&format!("not judged: the table may be misread, {}", cause.label));
-            }
-            Outcome::NotMet
-        }
-        _ => Outcome::Changed,
-    })
+    let misread = watch.causes.first().filter(|cause| cause.kind == CauseKind::Misread);
+    if let Some(cause) = misread.filter(|_| !common.prints_text()) {
+        diagnostic::warn(&format!("not judged: the table may be misread, {}", cause.label));
+    }
+    Ok(if watch.is_changed() { Outcome::Changed } else { Outcome::Done })
 }

@@ -330,7 +330,7 @@ fn the_command_has_exit_status_3_for_a_changed_arm() {
         cells.collect::<Vec<_>>().join(",")
     });
     folder.write("metres.csv", metres.collect::<Vec<_>>().join("\n") + "\n");
-    let misread = folder.flexcal(&format!("{run} --data metres.csv")).code(1);
+    let misread = folder.flexcal(&format!("{run} --data metres.csv")).code(3);
     assert_contains(&misread.stdout, &["Not judged: ", "Next: correct the table"]);
     let changed = folder.flexcal(&format!("{run} --data moved.csv")).code(3);
     assert_contains(&changed.stdout, &["Changed, seen after", "Next: flexcal identify"]);

@@ -62,7 +62,6 @@ fn misread_images_are_named() {
     ];
     for (words, change) in changes {
         let said = said_of(change);
-        println!("{said}");
         assert!(said.contains(words), "{words}: {said}");
     }
 }
