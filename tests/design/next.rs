@@ -157,7 +157,7 @@ fn a_plan_by_the_mean_variance_of_predictions_lowers_it() {
     let rms = |criterion: &str| {
         let out = folder.path(criterion).display().to_string();
         let truth = format!("--truth {cases}/truth.toml");
-        let plan = format!("plan {cases} {truth} --poses 16 --criterion {criterion} --out {out}");
+        let plan = format!("plan {cases} {truth} --poses 10 --criterion {criterion} --out {out}");
         run(path(""), &plan).success();
         let check = format!("check {cases} {truth} --candidates {out}/plan.csv --json --out {out}");
         number(&run(path(""), &check).json()["prediction"]["rms_mm"])

@@ -10,7 +10,7 @@ use super::mutation::mutated;
 use super::readers::{Bench, TARGETS, accepts};
 
 /// Number of mutations of each corpus file in the short run.
-const SHORT: u64 = 100;
+const SHORT: u64 = 40;
 
 /// Returns the corpus files of a reader.
 fn corpus(name: &str) -> Vec<Vec<u8>> {
