@@ -19,6 +19,9 @@ const MAX_SHOWN_INFLUENTIAL: usize = 3;
 /// Largest ratio of the noise variance that a fit with a prior assumes to the declared one, at which
 /// they are equal but for rounding.
 const MAX_EQUAL_VARIANCE_RATIO: f64 = 1.0 + 1e-9;
+/// Smallest ratio of the rms error of held-out rows to that of fitted rows which is said where no
+/// error bound says it.
+const UNCERTAIN_RATIO: f64 = 3.0;
 /// Name of the file that contains all outliers and influential rows.
 const RESULT_FILE: &str = "estimate.json";
 
@@ -314,6 +317,9 @@ pub(super) fn reservations(
         "held-out rows are farther from the prediction than the fit expects, beyond chance"
             .to_owned()
     });
+    let uncertain = uncertainty(found).filter(|_| {
+        accuracy.and_then(|accuracy| accuracy.bound.as_ref()).is_none() && farther.is_none()
+    });
     let outliers = found.finding(FindingCode::HeldOutOutliers).and_then(|finding| {
         let (rows, of) = (finding.count("rows")?, finding.count("of")?);
         let of = counted(of, &format!("held-out {}", row_noun(found)));
@@ -323,7 +329,23 @@ pub(super) fn reservations(
     let changed = found
         .has(FindingCode::RowsChanged)
         .then(|| "something changed between the rows (see the warnings)".to_owned());
-    [worse, prior, exceeding.or(farther).or(outliers), changed].into_iter().flatten().collect()
+    [worse, prior, exceeding.or(farther).or(outliers).or(uncertain), changed]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// States that held-out rows miss by far more than fitted ones although the covariance of the
+/// parameters allows it; `None` if they do not.
+fn uncertainty(found: &Identification) -> Option<String> {
+    let [fitted, held_out] = [&found.fitted.identification, &found.fitted.held_out];
+    let ratio = held_out.rms.norm / fitted.rms.norm;
+    (ratio.is_finite() && ratio > UNCERTAIN_RATIO).then(|| {
+        format!(
+            "held-out {}s miss by {ratio:.0} times as much as fitted ones, so more poses are needed",
+            row_noun(found)
+        )
+    })
 }
 
 /// States whether the fit is to be trusted, with what contradicts it, the held-out error before and

@@ -76,6 +76,31 @@ fn a_lens_is_contradicted_only_if_it_is_wrong() {
     }
 }
 
+/// The points of an image determine no more than the pose of the board, whatever their number.
+#[test]
+fn a_few_images_are_not_judged_by_the_number_of_their_points() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let problem = parse(&std::fs::read_to_string(folder.join("problem.toml")).unwrap());
+    let table = std::fs::read_to_string(folder.join("data.csv")).unwrap();
+    for (images, is_judged) in [(3, false), (20, true)] {
+        let joints = |line: &str| line.split(',').take(7).map(str::to_owned).collect::<Vec<_>>();
+        let mut fitted: Vec<Vec<String>> = Vec::new();
+        let is_kept = |line: &&str| {
+            let is_fitted = line.starts_with("identification");
+            if is_fitted && fitted.last() != Some(&joints(line)) {
+                fitted.push(joints(line));
+            }
+            !is_fitted || fitted.len() <= images
+        };
+        let table: Vec<&str> = table.lines().filter(is_kept).collect();
+        let rows = read_table(&problem, &(table.join("\n") + "\n"));
+        let found = identify(&problem, &split(&problem, rows), &Options::default()).unwrap();
+        assert_eq!(found.finding(FindingCode::PriorsDecide).is_none(), is_judged, "{images}");
+        let open = found.findings.iter().filter(|of| of.code == FindingCode::NotToldApart);
+        assert!(open.into_iter().all(|of| of.word("what") != Some("scale")), "{images}");
+    }
+}
+
 /// Truth of the bench arm with a camera on its tip and a board in front of it.
 const TRUTH: &str = r#"
 [parameters]

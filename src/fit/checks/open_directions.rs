@@ -121,12 +121,23 @@ impl Check for NamedDirections {
             Finding::new(FindingCode::NotToldApart, numbers, text).with_remedy(remedy)
         };
         let mut open = open_directions(&scaled, &names);
+        if knows_a_length(fit.problem) {
+            for (kind, _) in open.iter_mut().filter(|(kind, _)| *kind == Open::Scale) {
+                *kind = Open::Apart;
+            }
+        }
         // The nominal arm misses contacts, so that another scale changes the data there.
         if open.iter().all(|(open, _)| *open != Open::Scale) {
             open.extend(scale(fit.problem, fit.fitting.measurements, &names));
         }
         open.into_iter().map(finding).collect()
     }
+}
+
+/// Returns true if the problem declares a length between points: a `[[distance]]`, or a marker of
+/// several points.
+fn knows_a_length(problem: &Problem) -> bool {
+    !problem.distances.is_empty() || problem.fixtures.iter().any(|fixture| fixture.points.len() > 1)
 }
 
 /// Returns the sentence, with a remedy, that the rows of `table` leave the scale open; `None` if
@@ -242,7 +253,8 @@ fn is_fixture(name: &str) -> bool {
     words.iter().any(|word| name.starts_with(word)) && !is_lens(name) && field(name) != "radius"
 }
 
-fn is_lens(name: &str) -> bool {
+/// Returns true for a parameter of the lens of a camera, by its name.
+pub(super) fn is_lens(name: &str) -> bool {
     let of_pose = ["x", "y", "z", "rx", "ry", "rz"];
     name.starts_with("camera[") && !of_pose.contains(&field(name))
 }

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::DVector;
 
 use super::finding::{Finding, FindingCode};
+use super::open_directions::is_lens;
 use crate::fit::Placement;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::count_distinct;
@@ -53,7 +54,9 @@ impl PoseSufficiency {
             observation.coordinates() + if observation.is_position() { turned } else { 0 }
         };
         let of_row: Vec<usize> = (0..measurements.len()).map(of_row).collect();
-        let coordinates = coordinates(fitting, (&numbers, &of_arm), &split.identification, &of_row);
+        let lens = unknowns.iter().filter(|parameter| is_lens(&parameter.name)).count();
+        let coordinates =
+            coordinates(fitting, (&numbers, &of_arm), &split.identification, (&of_row, lens));
         let is_open = |parameter: &&&Parameter| {
             parameter.sigma.is_none()
                 && !fitting.earlier.is_some_and(|earlier| earlier.covers(&parameter.name))
@@ -137,7 +140,7 @@ fn coordinates(
     fitting: &Fitting,
     (numbers, of_arm): (&[usize], &[usize]),
     rows: &[usize],
-    of_row: &[usize],
+    (of_row, lens): (&[usize], usize),
 ) -> usize {
     let Fitting { model, measurements, placement, .. } = fitting;
     let (positions, others): (Vec<usize>, Vec<usize>) =
@@ -159,12 +162,20 @@ fn coordinates(
     };
     let contacts: BTreeSet<(usize, Observation)> =
         others.iter().map(|&row| (of_arm[row], measurements.observation(row))).collect();
+    let (image_points, contacts): (Vec<_>, Vec<_>) =
+        contacts.into_iter().partition(|(_, observation)| observation.point().is_some());
     let of_contacts: usize =
         contacts.iter().map(|(_, observation)| observation.coordinates()).sum();
+    let mut images: BTreeMap<(usize, [Option<usize>; 2]), usize> = BTreeMap::new();
+    for (pose, observation) in image_points {
+        *images.entry((pose, observation.fixtures())).or_default() += observation.coordinates();
+    }
+    let of_markers: usize = images.values().map(|count| (*count).min(BODY_COORDINATES)).sum();
+    let of_lenses = images.values().sum::<usize>().saturating_sub(of_markers).min(lens);
     let of_targets = targets.iter().filter(|(carrier, _)| several(**carrier));
     let of_targets: usize =
         of_targets.map(|(_, shape)| of_pose(shape).saturating_sub(BODY_COORDINATES)).sum();
-    of_poses + of_targets + of_contacts
+    of_poses + of_targets + of_contacts + of_markers + of_lenses
 }
 
 /// Returns the label of a base or tool: `base[A]`, or `base` for one without a name.
