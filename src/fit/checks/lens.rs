@@ -7,11 +7,13 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::finding::Finding;
 use super::view_order::views;
+use crate::error::Location;
 use crate::fit::{Estimate, FindingCode, Identification, IdentifyError, Placement};
 use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::observation::Scene;
-use crate::problem::{Fixture, ParameterRule, Problem};
+use crate::problem::pattern::matches;
+use crate::problem::{Fixture, Freedom, ParameterRule, Problem};
 
 /// Largest p-value of the F test at which freeing the intrinsics improves the fit significantly.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
@@ -110,9 +112,31 @@ pub(in crate::fit) fn lens_finding(
         words.collect::<Vec<_>>().join(", ")
     );
     let numbers = [json!(names), json!(before), json!(after)];
-    let remedy =
-        format!("free them in [parameters] ({}), or declare better ones", rules_in_words(&fixed));
+    let remedy = format!("{}, or declare better ones", freeing(problem, &fixed));
     Some(Finding::new(FindingCode::LensContradicted, numbers, text).with_remedy(remedy))
+}
+
+/// States what frees the intrinsics `names` in `[parameters]`: lines to delete that hold them, and
+/// lines to add for those that no line frees.
+fn freeing(problem: &Problem, names: &[String]) -> String {
+    let rule =
+        |name: &String| problem.parameters.iter().rev().find(|rule| matches(&rule.pattern, name));
+    let (held, others): (Vec<&String>, Vec<&String>) = names
+        .iter()
+        .partition(|name| rule(name).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed)));
+    let mut lines: Vec<String> = Vec::new();
+    for rule in held.into_iter().filter_map(rule) {
+        let place = Location { key: None, excerpt: None, ..rule.location.clone() };
+        let line = format!("\"{}\" = {{ fixed = true }} ({place})", rule.pattern);
+        if !lines.contains(&line) {
+            lines.push(line);
+        }
+    }
+    let delete = (!lines.is_empty()).then(|| format!("delete {}", lines.join(" and ")));
+    let others: Vec<String> = others.into_iter().cloned().collect();
+    let free = (!others.is_empty())
+        .then(|| format!("free them in [parameters] ({})", rules_in_words(&others)));
+    delete.into_iter().chain(free).collect::<Vec<_>>().join("; ")
 }
 
 /// Returns the lines of `[parameters]` that free the intrinsics `names`, one for each kind of
