@@ -352,7 +352,7 @@ fn measures_no_position(problem: &Problem) -> bool {
 fn to_export(common: &Common, problem: &Problem, estimate: &Path) -> String {
     let [named, estimate] = [common.problem(), estimate].map(shell_word);
     let export = format!("flexcal export {named} --estimate {estimate}");
-    if problem.urdf.is_some() && problem.is_chain() {
+    if problem.urdf.is_some() {
         return format!("{export} --urdf ARM.urdf writes the calibrated URDF");
     }
     let cameras = problem.fixtures.iter().filter(|fixture| fixture.kind.word() == "camera");

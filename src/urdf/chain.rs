@@ -119,6 +119,26 @@ impl<'a> Chain<'a> {
         Self::new(robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))
     }
 
+    /// Returns the chain from the same base to the link that the last of some joints moves.
+    ///
+    /// # Errors
+    /// Returns an error if the moving joints of that chain are not `joints`.
+    pub(super) fn branch(&self, joints: &[String]) -> Result<Self, InputError> {
+        let name = joints.last();
+        let last = self.robot.joints.iter().find(|joint| Some(&joint.name) == name);
+        let name = |link: usize| self.robot.links.get(link).map(|link| link.name.as_str());
+        let tip = last.map_or(self.base, |joint| joint.child);
+        let (base, tip) = (name(self.base), name(tip));
+        let branch = Self::new(self.robot, base, tip)?;
+        let found = branch.joint_names();
+        if found == joints {
+            return Ok(branch);
+        }
+        let [base, tip] = [base, tip].map(|name| name.unwrap_or_default().to_owned());
+        let expected = joints.to_vec();
+        Err(self.robot.error(UrdfErrorKind::OtherJoints { base, tip, found, expected }))
+    }
+
     /// Returns the name of the last moving joint if no fixed joint follows it, so that no origin of
     /// the URDF can hold a transform after it; `None` otherwise.
     #[doc(hidden)]

@@ -6,6 +6,7 @@
 //! problem therefore differ by a rotation about and a shift along each joint's axis, called the
 //! gauge of that axis.
 
+mod branch;
 mod chain;
 mod describe;
 mod export;
@@ -19,10 +20,10 @@ mod patches;
 mod read;
 mod yaml;
 
+pub(crate) use branch::Steps;
 pub use chain::Chain;
 pub use describe::{Description, describe};
 pub(crate) use describe::{SIGMA_MM, describe_measured};
-pub(crate) use export::Steps;
 pub use export::{Export, export};
 pub(crate) use patches::MovedOrigin;
 pub use read::Robot;

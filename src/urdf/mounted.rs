@@ -1,6 +1,6 @@
 //! Cameras and markers that are mounted on the arm, as links of a URDF.
 
-use super::chain::Chain;
+use super::branch::Branch;
 use super::patches::Patches;
 use super::read::Kind;
 use crate::mechanics::Arm;
@@ -38,18 +38,16 @@ pub fn mounted_links(problem: &Problem, model: &Model, x: &[f64]) -> Vec<Mounted
 
 /// Adds a link with a fixed joint for each of the `mounted`. If the file has the link on the same
 /// parent, the origin of its joint is changed instead. Returns the names of the links that the file
-/// has elsewhere, which stay as they are.
-///
-/// `gauges` are the transforms from the chain's axis frames to those of the problem.
+/// has elsewhere, which stay as they are. The first of the branches ends at the tip.
 pub(super) fn mount(
     patches: &mut Patches,
-    chain: &Chain,
-    (problem, arm, gauges): (&Problem, &Arm<f64>, &[Frame<f64>]),
+    branches: &[Branch],
+    arm: &Arm<f64>,
     mounted: &[MountedLink],
 ) -> Vec<String> {
-    let (robot, mut elsewhere) = (chain.robot, Vec::new());
+    let (robot, mut elsewhere) = (patches.robot, Vec::new());
     for MountedLink { link, carrier, pose } in mounted {
-        let (parent, carried) = carrying_link(chain, (problem, arm, gauges), *carrier);
+        let Some((parent, carried)) = carrying_link(branches, arm, *carrier) else { continue };
         let origin = carried.compose(pose);
         let Some(index) = robot.links.iter().position(|known| known.name == *link) else {
             let name = robot.links.get(parent).map_or("", |link| link.name.as_str());
@@ -59,7 +57,9 @@ pub(super) fn mount(
         let joint = robot.joints.iter().position(|joint| {
             joint.child == index && joint.parent == parent && joint.kind == Kind::Fixed
         });
-        match joint.filter(|joint| !chain.joints.contains(joint)) {
+        let is_in_chain =
+            |joint: &usize| branches.iter().any(|branch| branch.chain.joints.contains(joint));
+        match joint.filter(|joint| !is_in_chain(joint)) {
             Some(joint) => patches.set_origin(joint, &origin),
             None => elsewhere.push(link.clone()),
         }
@@ -68,18 +68,23 @@ pub(super) fn mount(
 }
 
 /// Returns the index of the link that moves with frame `carrier` of the problem, and that frame in
-/// the frame of the link. It is the tip for the last joint, otherwise the link behind the moving
-/// joint at or before the carrier.
+/// the frame of the link. It is the tip for the last joint of the first branch, otherwise the link
+/// behind the moving joint at or before the carrier.
 fn carrying_link(
-    chain: &Chain,
-    (problem, arm, gauges): (&Problem, &Arm<f64>, &[Frame<f64>]),
+    branches: &[Branch],
+    arm: &Arm<f64>,
     carrier: usize,
-) -> (usize, Frame<f64>) {
-    if carrier == problem.joints.len() {
-        return (chain.tip, Frame::identity());
+) -> Option<(usize, Frame<f64>)> {
+    let last = carrier.checked_sub(1);
+    let is_on = |branch: &&Branch| last.is_none_or(|last| branch.path.contains(&last));
+    let Branch { chain, path, gauges } = branches.iter().find(is_on)?;
+    let is_first = branches.first().is_some_and(|first| first.path == *path);
+    if is_first && last.is_some() && path.last().copied() == last {
+        return Some((chain.tip, Frame::identity()));
     }
     let (mut parent, mut frame, mut moving) = (chain.base, Frame::identity(), 0);
-    for joint in arm.joints.iter().take(carrier) {
+    for &index in path.iter().take_while(|&&index| last.is_some_and(|last| index <= last)) {
+        let Some(joint) = arm.joints.get(index) else { continue };
         joint.advance_to_zero(&mut frame);
         if joint.kind != JointKind::Fixed {
             moving += 1;
@@ -90,5 +95,5 @@ fn carrying_link(
         }
         frame.rotate_y(joint.beta.sin_cos);
     }
-    (parent, frame)
+    Some((parent, frame))
 }

@@ -1,5 +1,6 @@
 //! Changes to the origins and links in the text of a URDF. All other bytes stay.
 
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -51,12 +52,14 @@ pub(super) struct Patches<'a> {
     /// Replaced byte ranges with their new text.
     text: Vec<(Range<usize>, String)>,
     moved: Vec<MovedOrigin>,
+    /// Indices of the joints whose origin is set; a trunk belongs to several branches.
+    set: BTreeSet<usize>,
 }
 
 impl<'a> Patches<'a> {
     /// Creates an empty list of changes.
     pub fn new(robot: &'a Robot) -> Self {
-        Self { robot, text: Vec::new(), moved: Vec::new() }
+        Self { robot, text: Vec::new(), moved: Vec::new(), set: BTreeSet::new() }
     }
 
     /// Returns the transform through some fixed joints with right angles restored, and changes
@@ -72,8 +75,12 @@ impl<'a> Patches<'a> {
         frame
     }
 
-    /// Replaces the origin of the joint with this index by `frame` if they differ.
+    /// Replaces the origin of the joint with this index by `frame` if they differ and it has not
+    /// been set before.
     pub fn set_origin(&mut self, index: usize, frame: &Frame<f64>) {
+        if !self.set.insert(index) {
+            return;
+        }
         let Some(joint) = self.robot.joints.get(index) else { return };
         let old = as_written(&joint.origin);
         let (angle, distance) = difference(&old, frame);

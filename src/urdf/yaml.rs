@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use nalgebra::Vector3;
 
-use super::export::Steps;
+use super::branch::Steps;
 use crate::error::{InputError, Location, UrdfErrorKind};
 use crate::mechanics::Arm;
 use crate::problem::{JointKind, Problem};

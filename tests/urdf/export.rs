@@ -2,8 +2,8 @@
 
 use flexcal::mechanics::Arm;
 use flexcal::urdf::{
-    Chain, Robot, YamlFormat, describe, export, export_with_links, joint_origins, mounted_links,
-    yaml,
+    Chain, MountedLink, Robot, YamlFormat, describe, export, export_with_links, joint_origins,
+    mounted_links, yaml,
 };
 use nalgebra::{DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
@@ -132,6 +132,46 @@ rotation_deg = [0, 0, 45]
 points_mm = [[0, 0, 0]]
 "#;
 
+/// Asserts that the links of an exported URDF have the poses of cameras and markers of a problem
+/// with the parameters `x`, in all configurations.
+fn assert_links(
+    moved: &Robot,
+    base: &str,
+    mounted: &[MountedLink],
+    (problem, configurations, x): (&Problem, &[Vec<f64>], &DVector<f64>),
+) {
+    for mounted in mounted.iter().filter(|mounted| mounted.carrier > 0) {
+        let of_link = problem_of(&Chain::new(moved, Some(base), Some(&mounted.link)).unwrap());
+        let of_link_q: Vec<Vec<f64>> = configurations
+            .iter()
+            .map(|q| {
+                let value = |name: &str| problem.joints.iter().position(|joint| joint.name == name);
+                of_link
+                    .joints
+                    .iter()
+                    .map(|joint| value(&joint.name).map_or(0.0, |k| q[k]))
+                    .collect()
+            })
+            .collect();
+        let rows = Dataset::poses(&of_link_q).measurements().unwrap();
+        let nominal = DVector::zeros(model_of(&of_link, &rows).parameters.len());
+        let mut carrier = problem.clone();
+        carrier.tool.joint = mounted.carrier - 1;
+        let seen = tips(&carrier, configurations, x);
+        let expected: Vec<[Vector3<f64>; 3]> = seen
+            .iter()
+            .map(|&[origin, x, z]| {
+                let axes = [x, z.cross(&x), z];
+                let turned = |v: &Vector3<f64>| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
+                let [of_x, _, of_z] = &mounted.pose.axes;
+                [origin + turned(&mounted.pose.origin), turned(of_x), turned(of_z)]
+            })
+            .collect();
+        let off = apart(&expected, &tips(&of_link, &of_link_q, &nominal));
+        assert!(off < 1e-9, "{}: {off:e}", mounted.link);
+    }
+}
+
 #[test]
 fn cameras_and_markers_on_the_arm_become_links() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
@@ -165,42 +205,99 @@ fn cameras_and_markers_on_the_arm_become_links() {
     assert!(exported.elsewhere.is_empty());
     assert!(exported.moved.iter().any(|origin| origin.joint == "eye_mount"));
     let moved = Robot::parse(&exported.text, std::path::Path::new("moved.urdf")).unwrap();
-    for mounted in mounted.iter().filter(|mounted| mounted.carrier > 0) {
-        let of_link = problem_of(&Chain::new(&moved, Some("world"), Some(&mounted.link)).unwrap());
-        let of_link_q: Vec<Vec<f64>> = configurations
-            .iter()
-            .map(|q| {
-                let value = |name: &str| problem.joints.iter().position(|joint| joint.name == name);
-                of_link
-                    .joints
-                    .iter()
-                    .map(|joint| value(&joint.name).map_or(0.0, |k| q[k]))
-                    .collect()
-            })
-            .collect();
-        let rows = Dataset::poses(&of_link_q).measurements().unwrap();
-        let nominal = DVector::zeros(model_of(&of_link, &rows).parameters.len());
-        let mut carrier = problem.clone();
-        carrier.tool.joint = mounted.carrier - 1;
-        let seen = tips(&carrier, &configurations, &x);
-        let expected: Vec<[Vector3<f64>; 3]> = seen
-            .iter()
-            .map(|&[origin, x, z]| {
-                let axes = [x, z.cross(&x), z];
-                let turned = |v: &Vector3<f64>| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
-                let [of_x, _, of_z] = &mounted.pose.axes;
-                [origin + turned(&mounted.pose.origin), turned(of_x), turned(of_z)]
-            })
-            .collect();
-        let off = apart(&expected, &tips(&of_link, &of_link_q, &nominal));
-        assert!(off < 1e-9, "{}: {off:e}", mounted.link);
-    }
+    assert_links(&moved, "world", &mounted, (&problem, &configurations, &x));
     // The camera on the upper arm cannot move to another parent.
     let other = text.replace("<parent link=\"upper\"/><child", "<parent link=\"fore\"/><child");
     let other = Robot::parse(&other, std::path::Path::new("odd.urdf")).unwrap();
     let chain = Chain::new(&other, None, Some("tool")).unwrap();
     let exported = export_with_links(&chain, &problem, &model.arm(|k| x[k]), &mounted).unwrap();
     assert_eq!(exported.elsewhere, ["eye_optical_frame"]);
+}
+
+/// A marker on each arm of the torso, on the last joint and before it.
+const ON_BOTH_ARMS: &str = r#"
+[[marker]]
+name = "left"
+on = "left wrist"
+at_m = [0.1, 0.02, 0.03]
+rotation_deg = [10, -20, 30]
+points_mm = [[0, 0, 0]]
+[[marker]]
+name = "right"
+on = "right forearm"
+at_m = [0.05, 0, 0.02]
+rotation_deg = [5, 0, 80]
+points_mm = [[0, 0, 0]]
+"#;
+
+/// Joints of the torso with two arms in a URDF: name, parent and child link, origin.
+const TWO_ARMS: [[&str; 5]; 12] = [
+    ["waist", "pelvis", "hip", "0 0 0.4", "0 0 0"],
+    ["chest", "hip", "torso", "0 0 0", "1.5707963267948966 -1.5707963267948966 0"],
+    ["left mount", "torso", "l0", "0.45 0 -0.2", "3.141592653589793 0 0"],
+    ["left shoulder", "l0", "l1", "0 0 0", "0 0 0"],
+    ["left elbow", "l1", "l2", "0.3 -0.04330127018922193 0.025", "1.0471975511965976 0 0"],
+    ["left wrist", "l2", "left_hand", "0.28 0 0", "-1.5707963267948966 0 0"],
+    ["right mount", "torso", "r0", "0.45 0 0.2", "0 0 0"],
+    ["right shoulder", "r0", "r1", "0 0 0", "0 0 0"],
+    ["right elbow", "r1", "r2", "0.3 0.04330127018922193 0.025", "-1.0471975511965976 0 0"],
+    ["right forearm", "r2", "r3", "0 -0.25 0", "1.5707963267948966 0 0"],
+    ["right wrist", "r3", "r4", "0.05 0 0", "-1.5707963267948966 0 0"],
+    ["right flange", "r4", "right_hand", "0 0 0", "0 0 0"],
+];
+
+#[test]
+fn every_branch_of_a_tree_is_exported() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let text = std::fs::read_to_string(path("problems/two-arms/problem.toml")).unwrap();
+    let (arm, rest) = text.split_at(text.find("[[target]]").unwrap());
+    let rigid = arm.lines().filter(|line| !line.starts_with("stiff") && !line.starts_with("body"));
+    let rigid: String = rigid.map(|line| line.to_owned() + "\n").collect();
+    let rest = rest[rest.find("[parameters]").unwrap()..].replace("\"joint*.stiff", "# ");
+    let rest = rest.replace("[data]", "\"joint*.beta\" = { sigma_deg = 0.2 }\n[data]");
+    let problem = parse(&format!("{rigid}{ON_BOTH_ARMS}{rest}"));
+    let link = |name: &str| format!("<link name=\"{name}\"/>\n");
+    let joint = |[name, parent, child, xyz, rpy]: [&str; 5]| {
+        let is_fixed = name.ends_with("mount") || name.ends_with("flange");
+        let kind = if is_fixed { "fixed" } else { "continuous" };
+        format!(
+            "{}<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/>\
+             <child link=\"{child}\"/><origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>\
+             <axis xyz=\"0 0 1\"/></joint>\n",
+            link(child)
+        )
+    };
+    let joints: String = TWO_ARMS.into_iter().map(joint).collect();
+    let urdf = format!("<robot name=\"torso\">\n{}{joints}</robot>\n", link("pelvis"));
+    let original = Robot::parse(&urdf, std::path::Path::new("torso.urdf")).unwrap();
+    let chain = Chain::new(&original, Some("pelvis"), Some("right_hand")).unwrap();
+    let configurations: Vec<Vec<f64>> = (0..20)
+        .map(|_| {
+            let mut q: Vec<f64> =
+                problem.joints.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
+            (q[2], q[6]) = (0.0, 0.0);
+            q
+        })
+        .collect();
+    let model = model_of(&problem, &Dataset::poses(&configurations).measurements().unwrap());
+    let mut x = draw(&model, |_| 0.0, &mut rng);
+    for (x, parameter) in x.iter_mut().zip(&model.parameters) {
+        *x *= f64::from(u8::from(parameter.name.starts_with("joint")));
+    }
+    let mounted = mounted_links(&problem, &model, x.as_slice());
+    let exported = export_with_links(&chain, &problem, &model.arm(|k| x[k]), &mounted).unwrap();
+    let moved = Robot::parse(&exported.text, std::path::Path::new("moved.urdf")).unwrap();
+    assert_links(&moved, "pelvis", &mounted, (&problem, &configurations, &x));
+    assert_eq!(mounted.len(), 2);
+    let names: Vec<&str> = exported.moved.iter().map(|origin| origin.joint.as_str()).collect();
+    let at = |name| names.iter().filter(|moved| **moved == name).count();
+    assert_eq!((at("chest"), at("left elbow"), at("right flange")), (1, 1, 1), "{names:?}");
+
+    let same = export_with_links(&chain, &problem, &Arm::nominal(&problem), &[]).unwrap();
+    assert!(same.moved.is_empty(), "{:?}", same.moved);
+    let left = Chain::new(&original, Some("pelvis"), Some("l2")).unwrap();
+    let error = export(&left, &problem, &Arm::nominal(&problem)).unwrap_err().to_string();
+    assert!(error.contains("right wrist"), "{error}");
 }
 
 #[test]
