@@ -127,3 +127,30 @@ fn a_moved_zero_is_not_taken_for_a_moved_board() {
     let same = images_after(&calibrated, &[], 51);
     assert!(!watch(problem, &estimate, &same, (0.0, 0.01)).unwrap().is_changed());
 }
+
+#[test]
+fn a_board_that_moves_within_a_table_is_named_with_the_row() {
+    let (problem, rows, found) = calibrated();
+    let model = model_of(&problem, &rows);
+    let mut x = found.x.clone();
+    let name = "marker[board].x";
+    x[model.parameters.iter().position(|parameter| parameter.name == name).unwrap()] += 0.003;
+    let still = measured_with(&model, &rows, &found.x, (1.0, 5));
+    let elsewhere = measured_with(&model, &rows, &x, (1.0, 5));
+    assert_eq!(still.len(), elsewhere.len());
+    // The first row of an image, nine rows each.
+    let first = 20 * 9;
+    let mut moved = still.clone();
+    moved.positions[first..].copy_from_slice(&elsewhere.positions[first..]);
+    let options = Options::default().with_influential_rows();
+    let changed = |table: Measurements| {
+        let split = Split::new(&problem, &table).unwrap();
+        let data = Dataset { measurements: table, split };
+        let found = identify(&problem, &data, &options).unwrap();
+        found.finding(FindingCode::RowsChanged).map(ToString::to_string)
+    };
+    assert_eq!(changed(still), None);
+    let said = changed(moved.clone()).unwrap();
+    let row = moved.location(first).to_string();
+    assert!(said.contains("marker board stands elsewhere, by 3.") && said.contains(&row), "{said}");
+}

@@ -1,8 +1,11 @@
 //! Check of the order of the rows: does something differ from a certain row on?
 //!
-//! A reflector that is put into another nest, a station that is moved, or a joint that loses its
-//! zero position changes one place of the model between two rows. All places and rows are compared,
-//! in the order of the table and, to see whether the order counts, in others.
+//! A reflector that is put into another nest, a station or a board that is moved, or a joint that
+//! loses its zero position changes one place of the model between two rows. All places and rows are
+//! compared, in the order of the table and, to see whether the order counts, in others. The points
+//! of an image stay together.
+
+use std::collections::BTreeSet;
 
 use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
@@ -48,15 +51,16 @@ impl Check for RowsStayAlike {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let kinds = fit.kinds();
         let positions = kinds.iter().all(|kind| kind.observation.is_position());
+        let images = kinds.iter().all(|kind| kind.observation.point().is_some());
         let is_asked = fit.noise == Noise::Declared
             && fit.noise_factor >= MIN_NOISE_FACTOR
             && fit.has_further_fits
             && fit.fitting.loss == Loss::Squares
             && fit.fitting.earlier.is_none();
-        if !positions || !is_asked {
+        if !(positions || images) || !is_asked {
             return Vec::new();
         }
-        changed(fit).into_iter().collect()
+        changed(fit, images).into_iter().collect()
     }
 }
 
@@ -66,6 +70,9 @@ impl Place {
         match parameter.site {
             ParameterSite::Target { target, .. } => Some(Self::Target(target)),
             ParameterSite::Base { base, .. } => Some(Self::Base(base)),
+            ParameterSite::Fixture { fixture, kind, axis } if kind.has_pose() && axis < 6 => {
+                Some(Self::Fixture(fixture))
+            }
             ParameterSite::Joint { joint, field }
                 if matches!(parameter.regressor, Regressor::Constant | Regressor::Unit)
                     && Some(field) == zero_field(fit.problem, joint) =>
@@ -87,7 +94,8 @@ fn zero_field(problem: &Problem, joint: usize) -> Option<JointField> {
 }
 
 /// Returns the finding on a change from a row on; `None` if no change explains most of the misfit.
-fn changed(fit: &CheckedFit) -> Option<Finding> {
+/// In `images`, a change begins with an image, and that of the whole arm is not tried.
+fn changed(fit: &CheckedFit, images: bool) -> Option<Finding> {
     let stage = fit.whole;
     let rows = &fit.fitting.split.identification;
     let unknowns: Vec<&Parameter> = stage.parameters().collect();
@@ -100,12 +108,16 @@ fn changed(fit: &CheckedFit) -> Option<Finding> {
             places.entry(place).or_default().push(column);
         }
     }
-    places.insert(Place::Arm, (0..unknowns.len()).collect());
+    if !images {
+        places.insert(Place::Arm, (0..unknowns.len()).collect());
+    }
     let linear = Linear::of(fit)?;
     let mut order: Vec<usize> = (0..rows.len()).collect();
     order.sort_by_key(|&place| rows[place]);
-    let of_place = linear.best_of_places(&places, &order, &|_| true);
-    let of_arm = linear.best_of_arm_refined(&order).filter(|step| is_noise(&linear, step));
+    let groups = groups(fit, &order, images);
+    let of_place = linear.best_of_places(&places, &order, &begins(&groups));
+    let of_arm = (!images).then(|| linear.best_of_arm_refined(&order)).flatten();
+    let of_arm = of_arm.filter(|step| is_noise(&linear, step));
     let step = linear.better(of_place, of_arm)?;
     let freedom = freedom_of(&linear, &step);
     let noise = freedom.min(linear.cost);
@@ -119,10 +131,33 @@ fn changed(fit: &CheckedFit) -> Option<Finding> {
     if chance * tries > MAX_CHANCE_PROBABILITY {
         return None;
     }
-    if is_explained_otherwise(fit, (&linear, &places), &order, &step) {
+    if is_explained_otherwise(fit, (&linear, &places), (&order, &groups), &step) {
         return None;
     }
     Some(finding(fit, &linear, &places, &order, &step))
+}
+
+/// Returns the rows of an order in groups between which a change may begin: each image, or each row
+/// of other tables.
+fn groups(fit: &CheckedFit, order: &[usize], images: bool) -> Vec<Vec<usize>> {
+    let numbers = fit.fitting.measurements.arm_pose_numbers(fit.problem);
+    let pose = |place: usize| numbers[fit.fitting.split.identification[place]];
+    let together = |a: &usize, b: &usize| images && pose(*a) == pose(*b);
+    order.chunk_by(together).map(<[usize]>::to_vec).collect()
+}
+
+/// Returns a function that is true at the first row of a group, with [`MIN_ROWS`] groups on both
+/// sides.
+fn begins(groups: &[Vec<usize>]) -> impl Fn(usize) -> bool + use<> {
+    let mut first = 0;
+    let mut firsts = BTreeSet::new();
+    for (number, group) in groups.iter().enumerate() {
+        if number >= MIN_ROWS && groups.len() - number >= MIN_ROWS {
+            firsts.insert(first);
+        }
+        first += group.len();
+    }
+    move |row| firsts.contains(&row)
 }
 
 /// Returns true if the residual with a change is not larger than that of the declared noise (χ²
@@ -171,12 +206,16 @@ fn other_columns(fit: &CheckedFit, order: &[usize]) -> Vec<Vec<f64>> {
 fn is_explained_otherwise(
     fit: &CheckedFit,
     (linear, places): (&Linear, &Places),
-    order: &[usize],
+    (order, groups): (&[usize], &[Vec<usize>]),
     step: &Step,
 ) -> bool {
     let most = MIN_OTHER_RATIO * step.cost;
     let columns = other_columns(fit, order);
     let explains = |other: &[usize], may_begin: &dyn Fn(usize) -> bool| {
+        let of_place = linear.best_of_places(places, other, may_begin);
+        if !places.contains_key(&Place::Arm) {
+            return of_place.is_some_and(|found| found.cost < most);
+        }
         let mut firsts = linear.arm_rows(other.len(), may_begin);
         // A sorted order may be that of the table, or the reverse.
         let ends = firsts.first().copied().zip(firsts.last().copied());
@@ -185,7 +224,6 @@ fn is_explained_otherwise(
             |first: &usize| ends.is_some_and(|(a, b)| (a..=b).contains(first)) && may_begin(*first);
         firsts.extend(alike.into_iter().filter(is_between));
         firsts.sort_unstable();
-        let of_place = linear.best_of_places(places, other, may_begin);
         let found = linear.better(of_place, linear.best_of_arm(other, &firsts));
         found.is_some_and(|found| found.cost < most)
     };
@@ -201,9 +239,9 @@ fn is_explained_otherwise(
         linear.cost_of_drift(step.place, columns, order).is_none_or(|cost| cost < most)
     };
     let is_by_chance = |number: usize| {
-        let mut shuffled = order.to_vec();
+        let mut shuffled = groups.to_vec();
         shuffled.shuffle(&mut random::stream(SEED, number as u64));
-        explains(&shuffled, &|_| true)
+        explains(&shuffled.concat(), &begins(&shuffled))
     };
     places.get(&step.place).is_some_and(drifts)
         || columns.par_iter().any(is_other_order)
@@ -228,9 +266,9 @@ fn finding(
             [**column]
             .site
         {
-            ParameterSite::Target { axis, .. } | ParameterSite::Base { axis, .. } => {
-                axis / 3 == from
-            }
+            ParameterSite::Target { axis, .. }
+            | ParameterSite::Base { axis, .. }
+            | ParameterSite::Fixture { axis, .. } => axis / 3 == from,
             _ => false,
         });
         squares.map(|(_, change)| change * change).sum::<f64>().sqrt()
@@ -242,6 +280,19 @@ fn finding(
              rows another word in a column target"
                 .to_owned(),
         ),
+        Place::Fixture(index) => {
+            let fixture = fit.problem.fixtures.get(index);
+            let (kind, name) =
+                fixture.map_or(("marker", ""), |of| (of.kind.word(), of.name.as_str()));
+            let by = format!("{:.1} mm and {:.2}°", 1e3 * length(0), length(1).to_degrees());
+            (
+                format!("{kind} {name} stands elsewhere, by {by}"),
+                format!(
+                    "if it was put down or mounted again, declare a second [[{kind}]] and give \
+                     these rows its name in the column {kind}"
+                ),
+            )
+        }
         Place::Base(_) => (
             format!(
                 "the base stands elsewhere, by {:.1} mm and {:.2}°",
@@ -283,6 +334,7 @@ fn finding(
     let name = match step.place {
         Place::Target(_) => "target",
         Place::Base(_) => "base",
+        Place::Fixture(_) => "fixture",
         Place::Zero(_) => "zero",
         Place::Arm => "arm",
     };

@@ -168,8 +168,8 @@ finding_codes! {
         "A joint stands still in all fitted rows, or no joint turns by more than 10°, so that the fit says little about other poses.",
         "if the arm will move beyond these values, measure poses in which all joints move (flexcal plan chooses them)";
     RowsChanged: Warning "rows-changed" ["row", "place", "before", "after"]
-        "From a row on, one place of the model (target, base, a joint's zero position, or the \
-         whole arm) is different: this change explains more than four fifths of what noise does \
+        "From a row on, one place of the model (target, base, camera, marker, a joint's zero position, or \
+         the whole arm) is different: this change explains more than four fifths of what noise does \
          not, neither another order of the rows nor a drift does; the whole arm is named only if \
          both parts then fit within the declared noise.",
         "check what changed between these rows, and fit the rows before and after by themselves";

@@ -30,6 +30,8 @@ pub(super) enum Place {
     Zero(usize),
     /// Base with an index.
     Base(usize),
+    /// Pose of a camera or marker with an index.
+    Fixture(usize),
     /// All unknowns.
     Arm,
 }
