@@ -93,7 +93,7 @@ impl Compensation {
             .map_err(|error| raised(&error))?;
         let found = detached(py, || {
             let targets = Arc::unwrap_or_clone(rows);
-            let fitted = (&estimate, correction);
+            let fitted = (&estimate, correction, &[][..]);
             let solve = |targets: Measurements, frame: TargetFrame| {
                 remainder::Compensation::new(&problem, fitted, targets, frame, level)
             };

@@ -204,12 +204,22 @@ pub fn after_loop(
         let rival = found.alternatives.first()?;
         let pair = [found.effect.declaration.clone(), rival.effect.declaration.clone()];
         let law = found.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
-        Some((pair, separating_poses(law / rival.probability, measured_poses)))
+        let odds = rival.ln_odds_of_poses.map_or(law / rival.probability, f64::exp);
+        Some((pair, separating_poses(odds, measured_poses)))
     });
     let can_be_planned = |(pair, _): &([String; 2], (usize, bool))| {
         PoseRanges::of(problem).is_ok() && plan::effect_pair(pair, problem).is_ok()
     };
     let closed = shell_word(&results.path("problem.closed.toml"));
+    let undecided = result.effects.iter().find_map(|found| {
+        let rival = found.alternatives.first().filter(|rival| rival.is_undecided())?;
+        report::certified_length([&found.effect.effect, &rival.effect.effect])
+    });
+    if let Some(decided) = undecided {
+        return format!(
+            "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {decided}"
+        );
+    }
     if let Some(([effect, rival], (poses, is_enough))) = pairs.find(can_be_planned) {
         // The plan counts measured poses only if their files are named.
         let measured: Vec<String> = match common.data() {

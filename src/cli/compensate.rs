@@ -4,10 +4,12 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
+use flexcal::design;
 use flexcal::error::{InputError, InputErrorKind, TableErrorKind};
 use flexcal::fit;
 use flexcal::measurement::Measurements;
-use flexcal::remainder::{self, Compensation, TargetFrame};
+use flexcal::problem::Problem;
+use flexcal::remainder::{self, Compensation, Rival, TargetFrame};
 use flexcal::report::{self, Doubts, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
@@ -72,6 +74,22 @@ fn with_start(mut error: InputError) -> InputError {
     error
 }
 
+/// Reads the effects that the loop which wrote the problem did not exclude from the loop.json beside
+/// it, if there is one.
+fn rivals(common: &Common, problem: &Problem) -> Vec<Rival> {
+    let named = common.problem();
+    let folder = if named.is_dir() { Some(named) } else { named.parent() };
+    let file = folder.map(|folder| folder.join("loop.json")).filter(|file| file.is_file());
+    match file.map(|file| design::rivals(&file, problem)) {
+        Some(Ok(rivals)) => rivals,
+        None => Vec::new(),
+        Some(Err(error)) => {
+            common.hint([format!("{error}; what the loop did not decide is not in the bounds")]);
+            Vec::new()
+        }
+    }
+}
+
 /// Finds the commands that reach the targets, writes `commands.csv`, and prints which targets are
 /// reached.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -106,7 +124,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         );
     }
     let correction = remainder::of_estimate(&problem, &estimate);
-    let fitted = (&estimate, correction.as_ref().ok().and_then(Option::as_ref));
+    let rivals = rivals(common, &problem);
+    let fitted = (&estimate, correction.as_ref().ok().and_then(Option::as_ref), rivals.as_slice());
     let solve = |targets: Measurements, frame: TargetFrame| {
         Compensation::new(&problem, fitted, targets, frame, arguments.level)
     };
@@ -120,7 +139,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // An error of the remainder's file is reported only after errors of the estimate, which explain
     // more.
     correction?;
-    common.hint(fit::measurement_scale(&estimate).map(|scale| {
+    let undecided = report::undecided_commands(&found, &rivals);
+    common.hint(undecided.as_ref().map(|(said, _)| said));
+    let scale = fit::measurement_scale(&estimate).filter(|_| undecided.is_none());
+    common.hint(scale.map(|scale| {
         format!(
             "targets are true positions: the problem says that the measurement reads them {:.3} mm per metre too far apart (tracker-scale); \
              if the arm errs instead, so do the commands",
@@ -162,6 +184,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             "check the unit and the frame of the targets (--frame base takes them in the frame of the base) and the limits of the \
              joints"
                 .to_owned()
+        } else if let Some((_, next)) = undecided {
+            next
         } else {
             let these = if reached < commands.len() { "the commands of reached targets" } else { "these commands" };
             format!(

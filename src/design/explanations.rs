@@ -1,6 +1,7 @@
 //! Explanations of the residual that a loop leaves undecided, as read from its loop.json.
 
 use std::collections::HashSet;
+use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -10,6 +11,7 @@ use crate::error::InputError;
 use crate::files::{FORMAT_VERSION, newer_version, read_limited, was_changed};
 use crate::measurement::Measurements;
 use crate::problem::{Effect, EffectDeclaration, Problem};
+use crate::remainder::{Rival, Side};
 
 /// Maximum size of a loop.json \[MiB\].
 const MAX_FILE_MIB: u64 = 256;
@@ -67,15 +69,107 @@ struct Document {
 
 #[derive(Deserialize)]
 struct Found {
-    declaration: String,
     status: String,
+    #[serde(flatten)]
+    named: Named,
+    #[serde(default)]
+    claims: Option<Claims>,
     #[serde(default)]
     alternatives: Vec<Alternative>,
 }
 
 #[derive(Deserialize)]
 struct Alternative {
+    #[serde(flatten)]
+    named: Named,
+    probability: f64,
+}
+
+#[derive(Deserialize)]
+struct Named {
     declaration: String,
+    #[serde(default)]
+    description: String,
+    #[serde(default)]
+    parameters: Vec<Value>,
+}
+
+#[derive(Deserialize)]
+struct Value {
+    name: String,
+    estimate: f64,
+}
+
+#[derive(Deserialize)]
+struct Claims {
+    law: Probability,
+}
+
+#[derive(Deserialize)]
+struct Probability {
+    probability: f64,
+}
+
+impl Document {
+    /// Reads the loop.json of `problem`.
+    fn read(file: &Path, problem: &Problem) -> Result<Self, ExplanationsError> {
+        let named = || file.to_owned();
+        let unreadable = |source| ExplanationsError::Unreadable { file: named(), source };
+        let bytes = read_limited(file, MAX_FILE_MIB << 20).map_err(unreadable)?;
+        if let Some(version) = newer_version(&bytes) {
+            return Err(ExplanationsError::Newer { file: named(), version });
+        }
+        let document: Self = serde_json::from_slice(&bytes)
+            .map_err(|source| ExplanationsError::Syntax { file: named(), source })?;
+        if was_changed(file) {
+            return Err(ExplanationsError::Changed { file: named() });
+        }
+        if document.problem != problem.name {
+            let (found, expected) = (document.problem, problem.name.clone());
+            return Err(ExplanationsError::OtherProblem { file: named(), found, expected });
+        }
+        Ok(document)
+    }
+}
+
+impl Named {
+    fn side(&self, file: &Path, problem: &Problem) -> Result<Side, ExplanationsError> {
+        Ok(Side {
+            effect: problem.effect(&self.declaration, file)?,
+            description: self.description.clone(),
+            values: self.parameters.iter().map(|of| (of.name.clone(), of.estimate)).collect(),
+        })
+    }
+}
+
+/// Returns the effects that the loop.json of `problem` does not exclude in the place of effects
+/// that the problem declares, each with its probability.
+///
+/// # Errors
+/// Returns the errors of [`Explanations::read`], except that the loop.json of another problem has
+/// none.
+#[doc(hidden)]
+pub fn rivals(file: &Path, problem: &Problem) -> Result<Vec<Rival>, Box<dyn Error>> {
+    let document = match Document::read(file, problem) {
+        Err(ExplanationsError::OtherProblem { .. }) => return Ok(Vec::new()),
+        read => read?,
+    };
+    let mut rivals = Vec::new();
+    for found in document.effects.iter().filter(|found| found.status != "contradicted") {
+        let declared = found.named.side(file, problem)?;
+        let is_it = |known: &EffectDeclaration| known.effect.is_same_as(&declared.effect.effect);
+        if !problem.effects.iter().any(is_it) {
+            continue;
+        }
+        let others = found.alternatives.iter().map(|other| other.probability).sum::<f64>();
+        let law = found.claims.as_ref().map_or(1.0 - others, |claims| claims.law.probability);
+        for other in found.alternatives.iter().take(MAX_ALTERNATIVES) {
+            let share = other.probability / (law.max(0.0) + others).max(f64::MIN_POSITIVE);
+            let rival = other.named.side(file, problem)?;
+            rivals.push(Rival { declared: declared.clone(), rival, share });
+        }
+    }
+    Ok(rivals)
 }
 
 impl Explanations {
@@ -85,26 +179,12 @@ impl Explanations {
     /// Returns an error if the file cannot be read, is no loop.json or of a newer version, was
     /// changed since flexcal wrote it, or belongs to another problem.
     pub fn read(file: &Path, problem: &Problem) -> Result<Self, ExplanationsError> {
-        let named = || file.to_owned();
-        let unreadable = |source| ExplanationsError::Unreadable { file: named(), source };
-        let bytes = read_limited(file, MAX_FILE_MIB << 20).map_err(unreadable)?;
-        if let Some(version) = newer_version(&bytes) {
-            return Err(ExplanationsError::Newer { file: named(), version });
-        }
-        let document: Document = serde_json::from_slice(&bytes)
-            .map_err(|source| ExplanationsError::Syntax { file: named(), source })?;
-        if was_changed(file) {
-            return Err(ExplanationsError::Changed { file: named() });
-        }
-        if document.problem != problem.name {
-            let (found, expected) = (document.problem, problem.name.clone());
-            return Err(ExplanationsError::OtherProblem { file: named(), found, expected });
-        }
+        let document = Document::read(file, problem)?;
         let mut explanations = Self { fitted_rows: document.fitted_rows, ..Self::default() };
         for found in &document.effects {
-            let effect = problem.effect(&found.declaration, file)?;
+            let effect = problem.effect(&found.named.declaration, file)?;
             let alternatives = found.alternatives.iter().take(MAX_ALTERNATIVES);
-            let alternatives = alternatives.map(|of| problem.effect(&of.declaration, file));
+            let alternatives = alternatives.map(|of| problem.effect(&of.named.declaration, file));
             let alternatives: Vec<EffectDeclaration> = alternatives.collect::<Result<_, _>>()?;
             match found.status.as_str() {
                 "contradicted" => {}

@@ -45,7 +45,7 @@ pub use self::{
     candidate_poses::Extremes,
     check::{predictable_rows, random_rows},
     exchange::Exchange,
-    explanations::Explanations,
+    explanations::{Explanations, rivals},
     next::{NextError, NextOptions, NextPoses, NextStep, Purpose, StopReason, next},
     plan::PlanProgress,
     sensitivity::Sensitivity,

@@ -1,5 +1,7 @@
 //! Constant difference between the clocks of two tables that are joined by time.
 
+use csv::ByteRecord;
+
 use crate::error::{Location, Warning, WarningKind};
 use crate::problem::JoinRule;
 
@@ -23,41 +25,144 @@ const MIN_PAIRED_FRACTION: f64 = 0.8;
 /// certain.
 const MAX_RIVAL_FRACTION: f64 = 0.7;
 
+/// Smallest number of rests by which the clock of a continuous log is found.
+const MIN_RESTS: usize = 5;
+/// Smallest number of rows of a continuous log for each of its rests. A table with fewer has one row
+/// or some repeated ones for each pose.
+const MIN_ROWS_PER_REST: usize = 5;
+/// Largest difference of a number between two rows of a log in which the arm rests, in the unit of
+/// the table; readings of encoders scatter by less.
+const MAX_RESTING_CHANGE: f64 = 0.01;
+/// Smallest fraction of the tested rows that a shift must pair with rests. Positions are measured
+/// while the arm rests.
+const MIN_RESTING_FRACTION: f64 = 0.97;
+/// Largest number of rests that another shift may pair, as a fraction of those of the best shift.
+const MAX_RESTING_RIVAL_FRACTION: f64 = 0.95;
+
+/// Time \[s\] in which the arm rests by a joint table; both ends are equal for a single row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rest {
+    first: f64,
+    last: f64,
+}
+
+impl Rest {
+    fn middle(&self) -> f64 {
+        f64::midpoint(self.first, self.last)
+    }
+}
+
+/// Returns the rests of a joint table that logs all the time, also while the arm moves; empty for
+/// other tables. The rows are given in the order of their times \[s\], each with its cells; the
+/// column `key` holds the times.
+pub(super) fn rests<'r>(
+    rows: impl Iterator<Item = (f64, &'r ByteRecord)>,
+    key: Option<usize>,
+) -> Vec<Rest> {
+    let number = |cell: &[u8]| str::from_utf8(cell).ok()?.trim().parse::<f64>().ok();
+    let is_same = |one: &[u8], other: &[u8]| match (number(one), number(other)) {
+        (Some(one), Some(other)) => (one - other).abs() <= MAX_RESTING_CHANGE,
+        _ => one == other,
+    };
+    let is_resting = |one: &ByteRecord, other: &ByteRecord| {
+        let mut pairs = one.iter().zip(other).enumerate();
+        pairs.all(|(place, (one, other))| Some(place) == key || is_same(one, other))
+    };
+    let (mut rests, mut count): (Vec<Rest>, usize) = (Vec::new(), 0);
+    let mut current: Option<(Rest, &ByteRecord)> = None;
+    for (time, cells) in rows {
+        count += 1;
+        current = match current {
+            Some((rest, first)) if is_resting(first, cells) => {
+                Some((Rest { last: time, ..rest }, first))
+            }
+            ended => {
+                rests.extend(ended.map(|(rest, _)| rest));
+                Some((Rest { first: time, last: time }, cells))
+            }
+        };
+    }
+    rests.extend(current.map(|(rest, _)| rest));
+    rests.retain(|rest| rest.first < rest.last);
+    if rests.len() < MIN_RESTS || count < MIN_ROWS_PER_REST * rests.len() {
+        rests.clear();
+    }
+    rests
+}
+
 /// Returns the shift \[s\] that must be added to the times of a joint table, so that its rows pair
 /// best with the rows measured at `times` \[s\].
 ///
-/// `log` are the times of the joint table in ascending order \[s\]. Rows pair if their times differ
-/// by at most `tolerance` \[s\], or by half a second if that is more. Returns `None` if no shift
-/// pairs most rows, or if several do.
-pub(super) fn best_shift(times: &[f64], log: &[f64], tolerance: f64) -> Option<f64> {
-    let gap = tolerance.max(PAIR_GAP);
+/// `log` are the times of the joint table in ascending order \[s\], and `rests` those in which the
+/// arm rests. Rows pair if their times differ by at most `tolerance` \[s\], or by half a second if
+/// that is more. Returns `None` if no shift pairs most rows, or if several do.
+pub(super) fn best_shift(
+    times: &[f64],
+    (log, rests): (&[f64], &[Rest]),
+    tolerance: f64,
+) -> Option<f64> {
+    let resting = (MIN_RESTING_FRACTION, MAX_RESTING_RIVAL_FRACTION);
+    if let Some(shift) = shift_to(times, (rests, PAIR_GAP), resting) {
+        return Some(shift);
+    }
     if log.len() > MAX_LOG_ROWS {
         return None;
     }
+    let rows: Vec<Rest> = log.iter().map(|&time| Rest { first: time, last: time }).collect();
+    shift_to(times, (&rows, tolerance.max(PAIR_GAP)), (MIN_PAIRED_FRACTION, MAX_RIVAL_FRACTION))
+}
+
+/// Returns the shift \[s\] with which most of the `times` fall into different `rests`, or within
+/// `gap` \[s\] of them; `None` if these are less than the share `least` of the times, or if another
+/// shift pairs more than the share `most_of_rival` of them.
+fn shift_to(
+    times: &[f64],
+    (rests, gap): (&[Rest], f64),
+    (least, most_of_rival): (f64, f64),
+) -> Option<f64> {
     let tested = evenly(times, MAX_TESTED_ROWS);
     let count = |shift: f64| {
         let mut partners: Vec<usize> =
-            pairs(&tested, (log, gap), shift).map(|(_, row)| row).collect();
+            pairs(&tested, (rests, gap), shift).map(|(_, rest)| rest).collect();
         partners.sort_unstable();
         partners.dedup();
         partners.len()
     };
-    let shifts_of = |time: f64| log.iter().map(move |logged| time - logged);
+    let shifts_of = |time: f64| rests.iter().map(move |rest| time - rest.middle());
     let shifts = evenly(times, TRIAL_ROWS).into_iter().flat_map(shifts_of);
     let counted: Vec<(usize, f64)> = shifts.map(|shift| (count(shift), shift)).collect();
     let &(most, best) = counted.iter().max_by_key(|(pairs, _)| *pairs)?;
+    let mut lengths: Vec<f64> = rests.iter().map(|rest| rest.last - rest.first).collect();
+    lengths.sort_by(f64::total_cmp);
+    let apart = 2.0 * gap + lengths.get(lengths.len() / 2)?;
     let is_rival = |&&(pairs, shift): &&(usize, f64)| {
-        (shift - best).abs() > 2.0 * gap && pairs as f64 > MAX_RIVAL_FRACTION * most as f64
+        (shift - best).abs() > apart && pairs as f64 > most_of_rival * most as f64
     };
-    let is_clear = most >= MIN_PAIRS && most as f64 >= MIN_PAIRED_FRACTION * tested.len() as f64;
+    let is_clear = most >= MIN_PAIRS && most as f64 >= least * tested.len() as f64;
     if !is_clear || counted.iter().any(|counted| is_rival(&counted)) {
         return None;
     }
-    let mut differences: Vec<f64> = pairs(&tested, (log, gap), best)
-        .filter_map(|(time, row)| log.get(row).map(|logged| time - logged))
+    let mut differences: Vec<f64> = pairs(&tested, (rests, gap), best)
+        .filter_map(|(time, rest)| rests.get(rest).map(|rest| time - rest.middle()))
         .collect();
     differences.sort_by(f64::total_cmp);
     differences.get(differences.len() / 2).copied()
+}
+
+/// Returns the warning that the arm moved at the times \[s\] of some measured rows, by a log that is
+/// continuous, with the `offset` of its clock with which the arm rests at all of them; `None` if it
+/// rests at each, or if more rows than not are measured so and no other offset is certain.
+pub(super) fn moving_arm(
+    (times, rests): (&[f64], &[Rest]),
+    offset: impl FnOnce() -> Option<String>,
+    location: &Location,
+) -> Option<Warning> {
+    let gaps = times.iter().filter_map(|&time| nearest_rest(rests, time));
+    let rows = gaps.filter(|(_, gap)| *gap > PAIR_GAP).count();
+    let offset = if rows > 0 { offset() } else { None };
+    let is_usual = 2 * rows > times.len() && offset.is_none();
+    let kind = WarningKind::MovedAtTime { rows, of: times.len(), offset };
+    (rows > 0 && !is_usual).then(|| Warning { location: location.clone(), kind })
 }
 
 /// Unit of the differences between time zones \[s\].
@@ -69,7 +174,7 @@ const MAX_OFF_QUARTER: f64 = 2.0;
 /// Returns the whole quarters of an hour \[s\] that must be added to `times` \[s\], those of the
 /// rows without a partner, so that they have partners in `log`. `None` if no such shift is certain.
 fn zone_change(times: &[f64], log: &[f64]) -> Option<f64> {
-    let shift = -best_shift(times, log, PAIR_GAP)?;
+    let shift = -best_shift(times, (log, &[]), PAIR_GAP)?;
     let whole = (shift / QUARTER_HOUR).round() * QUARTER_HOUR;
     (whole != 0.0 && (shift - whole).abs() < MAX_OFF_QUARTER).then_some(whole)
 }
@@ -99,17 +204,29 @@ fn evenly(times: &[f64], most: usize) -> Vec<f64> {
     times.iter().copied().step_by(times.len().div_ceil(most).max(1)).collect()
 }
 
-/// Iterates over the measured times that have a partner in `log`, at most `most` \[s\] away, if
+/// Iterates over the measured times that have a partner among `rests`, at most `most` \[s\] away, if
 /// `shift` \[s\] is added to the times of the log. Each is returned with the index of its partner.
 fn pairs(
     times: &[f64],
-    (log, most): (&[f64], f64),
+    (rests, most): (&[Rest], f64),
     shift: f64,
 ) -> impl Iterator<Item = (f64, usize)> {
     times.iter().filter_map(move |&time| {
-        let (row, gap) = nearest(log, time - shift)?;
-        (gap <= most).then_some((time, row))
+        let (rest, gap) = nearest_rest(rests, time - shift)?;
+        (gap <= most).then_some((time, rest))
     })
+}
+
+/// Returns the index of the rest that is nearest to `time`, and the time between them \[s\]; `None`
+/// without rests, which must be in ascending order.
+fn nearest_rest(rests: &[Rest], time: f64) -> Option<(usize, f64)> {
+    let after = rests.partition_point(|rest| rest.last < time);
+    let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
+    let gap = |place: usize| {
+        let rest = rests.get(place)?;
+        Some((place, (rest.first - time).max(time - rest.last).max(0.0)))
+    };
+    around.filter_map(gap).min_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
 /// Returns the index of the entry of `log` that is nearest to `time`, and the time between them
@@ -130,23 +247,53 @@ mod tests {
         let uneven: Vec<f64> =
             (0..30).map(|k| f64::from(k * 8) + f64::from(k * k % 31) / 4.0).collect();
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
-        let shift = best_shift(&late, &uneven, 0.0).unwrap_or(0.0);
+        let shift = best_shift(&late, (&uneven, &[]), 0.0).unwrap_or(0.0);
         assert!((shift - 47.03).abs() < 1e-9, "{shift}");
         // Stamps that scatter by more than half a second need a tolerance.
         let slow: Vec<f64> = uneven.iter().map(|time| 6.0 * time).collect();
         let scattered =
             |k: usize, time: &f64| time + 73.4 + if k.is_multiple_of(2) { 1.4 } else { 0.0 };
         let late: Vec<f64> = slow.iter().enumerate().map(|(k, time)| scattered(k, time)).collect();
-        assert_eq!(best_shift(&late, &slow, 0.5), None);
-        let shift = best_shift(&late, &slow, 2.0).unwrap_or(0.0);
+        assert_eq!(best_shift(&late, (&slow, &[]), 0.5), None);
+        let shift = best_shift(&late, (&slow, &[]), 2.0).unwrap_or(0.0);
         assert!((shift - 74.1).abs() < 0.8, "{shift}");
         let even: Vec<f64> = (0..30).map(|k| f64::from(k * 8)).collect();
         let late: Vec<f64> = even.iter().map(|time| time + 47.03).collect();
-        assert_eq!(best_shift(&late, &even, 0.0), None);
-        assert_eq!(best_shift(&[], &even, 0.0), None);
+        assert_eq!(best_shift(&late, (&even, &[]), 0.0), None);
+        assert_eq!(best_shift(&[], (&even, &[]), 0.0), None);
         let late: Vec<f64> = uneven.iter().map(|time| time + 3600.3).collect();
         assert_eq!(zone_change(&late, &uneven), Some(-3600.0));
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
         assert_eq!(zone_change(&late, &uneven), None);
+    }
+    #[test]
+    fn the_clock_of_a_continuous_log_is_found_by_its_rests() {
+        // The arm moves for 8 s, and rests for 7 to 13 s; twice a second a row is logged.
+        let mut rows: Vec<(f64, ByteRecord)> = Vec::new();
+        let (mut time, mut measured) = (1000.0, Vec::new());
+        for pose in 0..40 {
+            for k in 0..2 * (15 + pose * pose % 7) {
+                let at = f64::from(pose) * 30.0 - (15.0 - f64::from(k)).max(0.0) * 2.0;
+                rows.push((time, ByteRecord::from(vec![time.to_string(), at.to_string()])));
+                time += 0.5;
+            }
+            measured.push(time - 1.0 - f64::from(pose % 5) + 3641.7);
+        }
+        let rests = rests(rows.iter().map(|(time, cells)| (*time, cells)), Some(0));
+        assert_eq!(rests.len(), 40);
+        let log: Vec<f64> = rows.iter().map(|(time, _)| *time).collect();
+        let shift = best_shift(&measured, (&log, &rests), 0.5).unwrap();
+        let place = Location::file(std::path::Path::new("problem.toml"));
+        let moved = |shift: f64| {
+            let times: Vec<f64> = measured.iter().map(|time| time - shift).collect();
+            moving_arm((&times, &rests), || None, &place).map(|warning| warning.kind)
+        };
+        assert_eq!(moved(shift), None);
+        assert!((shift - 3641.7).abs() < 3.0, "{shift}");
+        let later = moved(shift + 4.0);
+        assert!(matches!(later, Some(WarningKind::MovedAtTime { rows: 1.., of: 40, .. })));
+        // One row for each pose is no continuous log.
+        let few = rows.iter().step_by(40).map(|(time, cells)| (*time, cells));
+        assert_eq!(super::rests(few, Some(0)), []);
     }
 }

@@ -4,8 +4,9 @@ use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 use super::appended::{JointRow, JointTableFormat};
-use super::clocks::{best_shift, clock_jump, nearest};
+use super::clocks::{Rest, best_shift, clock_jump, moving_arm, nearest, rests};
 use super::headerless::{holds_numbers, no_header};
+use super::join_key::{Key, is_time, name_column, time_key};
 use super::mapped::Names;
 use super::meaning::is_numbered_or_position;
 use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
@@ -14,7 +15,6 @@ use super::table::{Table, shortened};
 use super::time::shown;
 use crate::error::{InputError, Location, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Dialect, JoinRule, JointLog, Problem};
-use crate::quantity::Unit;
 use crate::quantity::format::two_digits;
 
 /// Maximum number of measured rows without a partner that a warning lists.
@@ -43,6 +43,8 @@ pub(super) struct JoinedLog {
     by_time: Vec<usize>,
     /// Times of the rows in ascending order, on the clock of the measurements \[s\].
     log_times: Vec<f64>,
+    /// Times in which the arm rests, if the joint table logs all the time.
+    rests: Vec<Rest>,
     /// Column in the current table by which rows are paired; `None` for a join by order.
     key: Option<Key>,
     /// Number of measured rows for which a partner has been searched.
@@ -66,14 +68,6 @@ pub(super) struct JoinedLog {
     timed_pairs: Vec<TimedPair>,
 }
 
-/// Column that pairs rows, and its conversion to seconds if it holds times.
-#[derive(Clone, Copy)]
-struct Key {
-    /// Index of the column.
-    place: usize,
-    to_si: fn(f64) -> f64,
-}
-
 /// Row of the joint table.
 struct LogRow {
     source: JointRow,
@@ -81,22 +75,6 @@ struct LogRow {
     time: f64,
     /// Number of measured rows whose partner this row is.
     uses: usize,
-}
-
-/// Returns the index of the column with names of poses, `pose` or else `name`.
-fn name_column(names: &[String]) -> Option<usize> {
-    let place = |wanted: &str| names.iter().position(|name| name == wanted);
-    place("pose").or_else(|| place("name"))
-}
-
-/// Returns the column with times: one with a unit, else `time`, whose cells must be dates.
-fn time_key(names: &[String]) -> Option<Key> {
-    let place = |wanted: &str| names.iter().position(|name| name == wanted);
-    let with_unit = Unit::Time.suffixes().iter().find_map(|suffix| {
-        let place = place(&format!("time_{}", suffix.name))?;
-        Some(Key { place, to_si: suffix.to_si })
-    });
-    with_unit.or_else(|| place("time").map(|place| Key { place, to_si: |_| f64::NAN }))
 }
 
 impl JoinedLog {
@@ -115,6 +93,9 @@ impl JoinedLog {
         let time = |row: &usize| joined.rows.get(*row).map_or(f64::NAN, |row| row.time);
         by_time.sort_by(|a, b| time(a).total_cmp(&time(b)));
         joined.log_times = by_time.iter().map(time).collect();
+        let key = time_key(&joined.names).map(|key| key.place);
+        let timed = by_time.iter().filter_map(|&row| joined.rows.get(row));
+        joined.rests = rests(timed.map(|row| (row.time, &row.source.cells)), key);
         joined.by_time = by_time;
         if joined.rows.is_empty() {
             return Err(log.location.clone().error(TableErrorKind::NoDataFiles));
@@ -204,7 +185,9 @@ impl JoinedLog {
         }
         let is_new = |place: &usize| {
             let (name, header) = (self.names.get(*place), self.header.get(*place));
-            name.is_some_and(|name| !names.contains(name))
+            let is_key =
+                |name: &String| matches!(self.rule, JoinRule::Time { .. }) && is_time(name);
+            name.is_some_and(|name| !names.contains(name) && !is_key(name))
                 && header.is_some_and(|header| !table.header.contains(header))
         };
         let places: Vec<usize> = (0..self.header.len()).filter(is_new).collect();
@@ -322,7 +305,7 @@ impl JoinedLog {
     fn offset(&self, is_tolerant: bool) -> Option<String> {
         let JoinRule::Time { offset, tolerance } = self.rule else { return None };
         let tolerance = if is_tolerant { tolerance } else { 0.0 };
-        let shift = best_shift(&self.times, &self.log_times, tolerance)?;
+        let shift = best_shift(&self.times, (&self.log_times, &self.rests), tolerance)?;
         let seconds = ((offset + shift) * 1e3).round() / 1e3;
         Some(format!("{seconds:?}"))
     }
@@ -493,6 +476,8 @@ impl JoinedLog {
         let jump = clock_jump(self.rule, (&self.times, &self.log_times), self.unpaired.first());
         let others = unpaired.into_iter().flatten();
         let others = others.chain(jump.or_else(|| order_contradicted(&self.timed_pairs)));
+        let moving = (&*self.times, &*self.rests);
+        let others = others.chain(moving_arm(moving, || self.offset(true), &self.location));
         Ok(self.text_warnings.iter().cloned().chain(others).collect())
     }
 }

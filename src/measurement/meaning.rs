@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::convert::identity;
 
+use super::join_key::TIME_UNITS;
 use super::role::{POINT, Role, columns_with_unit, columns_without_unit};
 use crate::error::{InputError, InputErrorKind, TableErrorKind, WarningKind, nearest};
 use crate::problem::{Joint, JointKind, Problem};
@@ -131,6 +132,10 @@ impl Numbering {
                 base.to_owned()
             })
         };
+        let is_unit = |(unit, _): &&(&str, _)| role == Role::Time && suffix == Some(*unit);
+        if let Some((_, to_si)) = TIME_UNITS.iter().find(is_unit) {
+            return Ok(Meaning::Read(role, *to_si));
+        }
         match suffix {
             Some(suffix) => match unit.suffix(suffix) {
                 Some(suffix) => Ok(Meaning::Read(role, suffix.to_si)),

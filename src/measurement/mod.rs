@@ -28,6 +28,7 @@ mod duplicates;
 mod guessed_names;
 mod headerless;
 #[deny(clippy::indexing_slicing)]
+mod join_key;
 mod joined;
 mod joined_row;
 #[deny(clippy::indexing_slicing)]

@@ -256,6 +256,23 @@ impl Model {
         self.instrument.with_parameters(&self.parameters_at(x), x)
     }
 
+    /// Returns the errors of the instrument at `x` in the readings of some `positions`, one for each
+    /// pose, measuring frame \[m\]. Motions of the bases are no errors of readings.
+    pub(crate) fn reading_errors(
+        &self,
+        x: &[f64],
+        poses: &[Pose],
+        positions: &[Vector3<f64>],
+    ) -> Vec<Vector3<f64>> {
+        let instrument = self.instrument_at(x);
+        let faultless = instrument.without_errors();
+        let error = |(pose, position): (&Pose, &Vector3<f64>)| {
+            let setup = &pose.setup;
+            instrument.reading(position, setup) - faultless.reading(position, setup)
+        };
+        poses.iter().zip(positions).map(error).collect()
+    }
+
     /// Returns the base poses at `x`, measuring frame: translation \[m\] and rotation vector
     /// \[rad\].
     pub(crate) fn base_poses(&self, x: &[f64]) -> Vec<BasePose> {

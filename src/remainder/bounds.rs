@@ -18,9 +18,9 @@ pub struct Bounds {
     pub level: f64,
     /// Correction and uncertainty of the prediction in each pose.
     pub poses: Vec<CorrectedPose>,
-    /// Ratio of a pose's error bound to its expected error length ([`CorrectedPose::size`]).
-    factor: f64,
-    /// Number of configurations whose left-out errors determine `factor`.
+    /// Upper bound of the error length in each pose \[m\].
+    lengths: Vec<f64>,
+    /// Number of configurations whose left-out errors determine the bounds.
     learned_from: usize,
 }
 
@@ -85,7 +85,35 @@ impl Bounds {
     /// Creates the bounds at probability `level` for poses that `correction` corrected.
     pub fn new(correction: &Correction, poses: Vec<CorrectedPose>, level: f64) -> Self {
         let scores = &correction.scores;
-        Self { level, poses, factor: scores.quantile(level), learned_from: scores.configurations }
+        let factor = scores.quantile(level);
+        let lengths = poses.iter().map(|pose| factor * pose.size).collect();
+        Self { level, poses, lengths, learned_from: scores.configurations }
+    }
+
+    /// Returns the bounds for the case that, with the probability `share`, each pose errs by
+    /// another `differences` \[m\] in addition.
+    ///
+    /// P(error ≤ b) = (1 − w) P(e ≤ b) + w P(|e + d| ≤ b), with the share w and the difference d. It
+    /// is at least `level` for b = d + q((level − 1 + w) / w), for b = d + q(level), and for
+    /// b = q(level / (1 − w)), with the quantile q of e. The smallest of these is taken.
+    #[must_use]
+    pub(super) fn with_differences(
+        mut self,
+        quantile: impl Fn(f64) -> f64,
+        share: f64,
+        differences: &[f64],
+    ) -> Self {
+        let quantile = |level: f64| if level < 1.0 { quantile(level) } else { f64::INFINITY };
+        let beside = quantile(((self.level - 1.0 + share) / share).clamp(0.0, self.level));
+        let alone = quantile(self.level / (1.0 - share));
+        let is_likely = share > 1.0 - self.level;
+        let beside = if is_likely { beside } else { quantile(self.level) };
+        let poses = self.poses.iter_mut().zip(&mut self.lengths).zip(differences);
+        for ((pose, length), difference) in poses {
+            *length = (difference + beside * pose.size).min(alone * pose.size);
+            pose.size = pose.size.hypot(share.sqrt() * difference);
+        }
+        self
     }
 
     /// Compares the bounds with errors that were not fitted. `errors` has for each of them the
@@ -114,7 +142,7 @@ impl Bounds {
 
     /// Returns the upper bound of a pose's error length ‖measured − predicted‖ \[m\].
     pub fn bound(&self, pose: usize) -> f64 {
-        self.factor * self.poses[pose].size
+        self.lengths[pose]
     }
 
     /// Returns the mean of the error bounds over the poses \[m\]; NaN if there are none.
@@ -146,6 +174,8 @@ impl Bounds {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix3, Vector3};
+
     use super::*;
 
     #[test]
@@ -155,5 +185,32 @@ mod tests {
         assert!(test(16, 50).is_contradicted());
         assert!((test(50, 50).chance() - 1.0).abs() < 1e-12);
         assert!((test(41, 50).chance() - 0.0306).abs() < 1e-4);
+    }
+    #[test]
+    fn bounds_hold_as_often_as_stated_if_another_effect_may_act() {
+        // Errors are even between 0 and 1 mm, so that q(p) = p mm.
+        let quantile = |level: f64| 1e-3 * level;
+        let pose = CorrectedPose {
+            shift: Vector3::zeros(),
+            covariance: Matrix3::zeros(),
+            size: 1.0,
+            is_extrapolated: false,
+        };
+        let bound = |share: f64, difference: f64| {
+            let bounds =
+                Bounds { level: 0.95, poses: vec![pose], lengths: vec![0.95e-3], learned_from: 60 };
+            bounds.with_differences(quantile, share, &[difference]).bound(0)
+        };
+        for (share, difference) in
+            [(0.12, 1e-3), (0.12, 1e-4), (0.5, 2e-4), (0.9, 2e-3), (0.04, 5e-3), (0.04, 1e-5)]
+        {
+            let b = bound(share, difference);
+            let even = |b: f64| (b * 1e3).clamp(0.0, 1.0);
+            let held = (1.0 - share) * even(b) + share * even(b - difference);
+            assert!(held >= 0.95 - 1e-12, "{share} {difference}: {held}");
+            assert!(b <= difference + 1e-3, "{share} {difference}: {b}");
+        }
+        // One that hardly ever acts does not enlarge the bound by all that it would change.
+        assert!(bound(0.04, 5e-3) < 1.0e-3);
     }
 }

@@ -3,11 +3,16 @@
 use super::apply::compensate;
 use super::bounds::Bounds;
 use super::correction::Correction;
+use super::rivals::Rival;
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::{self, Command, Placement, SavedEstimate, SavedEstimateError, StageError};
 use crate::measurement::Measurements;
 use crate::model::Model;
 use crate::problem::Problem;
+
+/// Largest probability that another effect acts than the declared one, with which bounds are
+/// computed.
+const MAX_SHARE: f64 = 0.99;
 
 /// Frame in which the positions of targets are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +35,9 @@ pub struct Compensation {
     pub bounds: Option<Bounds>,
     /// True if the targets depend on the pose of the base, which the estimate does not determine.
     pub is_base_open: bool,
+    /// For each target, how far a wrong choice among effects that the loop did not decide would
+    /// move the arm \[m\]; the bounds include it. Empty without such effects.
+    pub differences: Vec<f64>,
 }
 
 /// Error of targets for which no commands can be found.
@@ -50,14 +58,15 @@ pub enum CompensationError {
 impl Compensation {
     /// Finds the commands for `targets`. Targets without positions are waypoints: the identified
     /// arm is brought to where the nominal arm would be with the same commands. `correction`
-    /// corrects predictions and bounds errors with probability `level`.
+    /// corrects predictions and bounds errors with probability `level`. The bounds hold whether the
+    /// declared effects or their `rivals` act.
     ///
     /// # Errors
     /// Returns an error if a row is no position, the estimate is of another problem or lacks a base
     /// or tool of the targets, or the nominal arm has no equilibrium at a waypoint.
     pub fn new(
         problem: &Problem,
-        (estimate, correction): (&SavedEstimate, Option<&Correction>),
+        (estimate, correction, rivals): (&SavedEstimate, Option<&Correction>, &[Rival]),
         targets: Measurements,
         frame: TargetFrame,
         level: f64,
@@ -97,8 +106,23 @@ impl Compensation {
             }
             None => (fit::compensate(problem, &model, &x, &sought)?, None),
         };
+        // Where the arm is meant to be is told by the instrument, or relative to the base.
+        let placed = if is_seen { targets.clone() } else { fit::seen_in_base(&model, &x, &sought) };
+        let mut differences = vec![0.0_f64; if rivals.is_empty() { 0 } else { placed.len() }];
+        for rival in rivals {
+            let rival = rival.differences(problem, &placed)?;
+            differences.iter_mut().zip(&rival).for_each(|(most, of)| *most = most.max(*of));
+        }
+        let share = rivals.iter().map(|rival| rival.share).sum::<f64>().min(MAX_SHARE);
+        let bounds = match (bounds, correction) {
+            (Some(bounds), Some(correction)) if !rivals.is_empty() => {
+                let quantile = |level: f64| correction.scores.quantile(level);
+                Some(bounds.with_differences(quantile, share, &differences))
+            }
+            (bounds, _) => bounds,
+        };
         let is_base_open = is_seen && estimate.leaves_base_open();
-        Ok(Self { targets, commands, bounds, is_base_open })
+        Ok(Self { targets, commands, bounds, is_base_open, differences })
     }
 
     /// Returns true if every target is reached.

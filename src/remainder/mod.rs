@@ -27,6 +27,7 @@ mod placement_fit;
 mod posterior;
 mod prior;
 mod residuals;
+mod rivals;
 mod rows;
 mod saved;
 mod scores;
@@ -52,6 +53,7 @@ pub use self::{
     compensation::{Compensation, CompensationError, TargetFrame},
     declared::{declared, of_estimate},
     fit::uncertainty,
+    rivals::{Rival, Side},
     saved::SavedRemainderError,
 };
 pub(crate) use declared::earlier;

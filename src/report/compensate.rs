@@ -3,14 +3,14 @@
 
 use std::fmt::Write as _;
 
-use super::document::Block;
+use super::document::{Block, percent};
 use super::remainder::bound_sentence;
 use super::render::text;
 use crate::fit::Command;
 use crate::measurement::Measurements;
-use crate::problem::{Joint, JointKind, Problem};
+use crate::problem::{Effect, Joint, JointKind, Problem};
 use crate::quantity::format::{mm, number};
-use crate::remainder::{Bounds, TargetFrame};
+use crate::remainder::{Bounds, Compensation, Rival, TargetFrame};
 use crate::results::CompensationResult;
 
 /// Returns the summary of the commands as text, with file and line of each target that cannot be
@@ -52,6 +52,49 @@ pub fn commands_text(
     };
     let points = commands.iter().filter(|command| !command.is_reached()).map(point).collect();
     text(&[Block::Lines(words, points)])
+}
+
+/// Smallest ratio of what an undecided effect would move the commands by to their error bound, at
+/// which a warning says so.
+const MIN_STATED_DIFFERENCE: f64 = 0.2;
+
+/// Returns a warning that the loop left an effect undecided that would change the commands, and
+/// what decides it; `None` if there is none, or if it hardly changes them.
+pub fn undecided_commands(found: &Compensation, rivals: &[Rival]) -> Option<(String, String)> {
+    let rival = rivals.iter().max_by(|one, other| one.share.total_cmp(&other.share))?;
+    let squares: f64 = found.differences.iter().map(|difference| difference.powi(2)).sum();
+    let rms = (squares / found.differences.len().max(1) as f64).sqrt();
+    let most = found.differences.iter().copied().fold(0.0, f64::max);
+    if rms <= MIN_STATED_DIFFERENCE * found.bounds.as_ref()?.mean() {
+        return None;
+    }
+    let said = format!(
+        "flexcal loop did not decide whether {} or, with {}, {}: in that case these commands miss by {} mm more in \
+         root mean square, {} mm at most; the bound holds for both",
+        rival.declared.description,
+        percent(rival.share),
+        rival.rival.description,
+        mm(rms, 3),
+        mm(most, 3)
+    );
+    let effects = [&rival.declared, &rival.rival].map(|side| &side.effect.effect);
+    let next = certified_length(effects).unwrap_or_else(|| {
+        let [one, other] = effects.map(Effect::declaration);
+        format!("flexcal plan --separate '{one}' '{other}' chooses poses that tell the two apart; run flexcal loop again with them")
+    });
+    Some((said, next))
+}
+
+/// Returns how to decide between two effects if one of them is a scale of the instrument, which poses
+/// hardly tell from errors of the arm; `None` for other effects.
+pub fn certified_length(effects: [&Effect; 2]) -> Option<String> {
+    let is_scale = |effect: &&Effect| matches!(effect, Effect::TrackerScale | Effect::FrameStrain);
+    let scale = effects.into_iter().find(is_scale)?;
+    Some(format!(
+        "measure a certified length with the instrument; if it reads true, write \"{}*\" = {{ fixed = true }} under \
+         [parameters] of the problem that flexcal loop was given, and run flexcal loop again",
+        scale.name()
+    ))
 }
 
 /// Mean distance from the targets to the positions that their joint columns predict, above which

@@ -75,6 +75,7 @@ pub use self::{
     compare::{compare_text, comparison_report},
     compensate::Doubts,
     compensate::commands_text,
+    compensate::{certified_length, undecided_commands},
     export::{
         ExportRemarks, better_geometry, export_text, holds_whole_model, kept_at_end, set_up_comment,
     },

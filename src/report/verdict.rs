@@ -240,7 +240,13 @@ pub(super) fn declared(effect: &NamedEffect) -> String {
 
 /// Describes an effect that may act instead of a found one, with its probability.
 pub(super) fn alternative(other: &AlternativeEffect) -> String {
-    format!("{} ({})", other.effect.description, percent(other.probability))
+    let probability = percent(other.probability);
+    let from = if other.is_undecided() {
+        "; the poses fit both equally well, so the probabilities are those before any was measured"
+    } else {
+        ""
+    };
+    format!("{} ({probability}{from})", other.effect.description)
 }
 
 /// Returns the title of a cause: its status unless that is `found`, what the data allow to claim

@@ -4,14 +4,16 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
+use super::alternative::AlternativeEffect;
 use super::claims::{Claims, NOWHERE, law_name};
 use super::effect::{EffectKeys, NamedEffect};
 use super::hints::resembled;
 use super::identification::{FindingKeys, InfluentialRowSet};
+use super::parameter_value::ParameterValue;
 use super::remainder::Remainder;
 use super::residual_test::{ResidualTest, size_alone, size_test};
 use super::summary::{Errors, KindErrors, Summary, in_mm_deg_px};
-use crate::fit::{Estimate, Finding, FindingCode, Identification};
+use crate::fit::{Finding, FindingCode, Identification};
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 use crate::remainder::Fitted;
@@ -124,33 +126,12 @@ pub struct FoundEffect {
     pub held_out_after: Summary,
 }
 
-/// Effect that may act instead of a found one.
-#[derive(Debug, Serialize, JsonSchema)]
-#[schemars(rename = "Alternative")]
-pub struct AlternativeEffect {
-    #[serde(flatten)]
-    pub effect: NamedEffect,
-    /// Probability that this effect acts instead of the found one.
-    pub probability: f64,
-}
-
 /// Verdict of measurements that are independent of the fit, such as readings of fixed points.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Witness {
     pub data: String,
     /// Verdict, `corroborated` or `contradicted`.
     pub says: &'static str,
-}
-
-/// Value of a parameter of an effect, SI units.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct ParameterValue {
-    pub name: String,
-    #[serde(serialize_with = "serialize_symbol")]
-    #[schemars(with = "String")]
-    pub unit: Unit,
-    pub estimate: f64,
-    pub std_error: Option<f64>,
 }
 
 /// Structure in the residual whose law is unknown.
@@ -370,10 +351,7 @@ impl FoundEffect {
             alternatives: found
                 .alternatives
                 .iter()
-                .map(|&(ref effect, probability)| AlternativeEffect {
-                    effect: named(effect),
-                    probability,
-                })
+                .map(|other| AlternativeEffect::new(other, found, trace))
                 .collect(),
             held_out_after: Summary::of(&found.held_out_after),
         }
@@ -389,30 +367,6 @@ impl FoundEffect {
     /// evaluated for it, and alone it is not significant.
     pub fn is_only_with_others(&self) -> bool {
         self.claims.is_none() && self.status == Status::Located
-    }
-}
-
-impl ParameterValue {
-    /// Converts the estimate of a parameter, in SI units.
-    pub(crate) fn new(estimate: &Estimate) -> Self {
-        Self {
-            name: estimate.name.clone(),
-            unit: estimate.unit,
-            estimate: estimate.estimate,
-            std_error: estimate.std_error,
-        }
-    }
-
-    /// Returns the amplitude of the harmonic with the coefficients `pair` of its sine and cosine,
-    /// whose errors are treated as uncorrelated.
-    pub(crate) fn amplitude(pair: &[Self]) -> Self {
-        let (sine, cosine) = (&pair[0], &pair[1]);
-        let amplitude = sine.estimate.hypot(cosine.estimate);
-        let std_error = sine.std_error.zip(cosine.std_error).map(|(of_sine, of_cosine)| {
-            (sine.estimate * of_sine).hypot(cosine.estimate * of_cosine)
-                / amplitude.max(f64::MIN_POSITIVE)
-        });
-        Self { estimate: amplitude, std_error, ..sine.clone() }
     }
 }
 
@@ -466,11 +420,4 @@ impl Step {
         let errors = Errors::new(Summary::of(identification), Summary::of(held_out), is_left_out);
         Self { effects: effects.clone(), errors }
     }
-}
-
-pub(super) fn serialize_symbol<S: serde::Serializer>(
-    unit: &Unit,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(&unit.symbol())
 }

@@ -185,7 +185,7 @@ pub struct SeparatedEffect {
     #[schemars(with = "EffectKeys")]
     pub effect: Effect,
     pub parameters: Vec<String>,
-    #[serde(serialize_with = "super::closed_loop::serialize_symbol")]
+    #[serde(serialize_with = "super::parameter_value::serialize_symbol")]
     #[schemars(with = "String")]
     pub unit: Unit,
     /// Standard deviation (1 σ) of the prior of the parameters.

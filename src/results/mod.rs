@@ -10,6 +10,7 @@
 )]
 
 mod acceptance;
+mod alternative;
 mod application;
 mod claims;
 mod closed_loop;
@@ -23,6 +24,7 @@ mod hints;
 mod identification;
 mod knowledge;
 mod next;
+mod parameter_value;
 pub(crate) mod plots;
 mod prior;
 mod remainder;
@@ -37,7 +39,7 @@ pub(crate) use acceptance::{AcceptanceRecord, AcceptanceResult, PoseAccuracy, Te
 pub(crate) use application::{InitResult, PredictionErrors};
 pub(crate) use claims::{Claims, at_place};
 pub use closed_loop::LoopResult;
-pub(crate) use closed_loop::{Gain, ParameterValue, Step, Structure, Witness};
+pub(crate) use closed_loop::{Gain, Step, Structure, Witness};
 pub(crate) use comparison::ComparedFit;
 pub(crate) use design::SeparationResult;
 pub use document::Document;
@@ -48,6 +50,7 @@ pub use identification::IdentificationResult;
 pub(crate) use knowledge::{
     Knowledge, LargestHarmonics, MAX_LISTED_COEFFICIENTS, MAX_SHOWN_HARMONICS,
 };
+pub(crate) use parameter_value::ParameterValue;
 pub use plots::PlotData;
 pub(crate) use plots::{
     BoundAt, Contribution, Point, PoseError, ScriptData, Stage, StageErrors, procedure_stages,
@@ -69,9 +72,10 @@ pub(crate) use effect::joined;
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
+    alternative::AlternativeEffect,
     application::CompensationResult,
     claims::Hypothesis,
-    closed_loop::{AlternativeEffect, Correction, Fit, FoundEffect, Row},
+    closed_loop::{Correction, Fit, FoundEffect, Row},
     comparison::ComparisonResult,
     design::{CheckResult, ExpectedParameter, PlanResult},
     effect::Untestable,

@@ -9,6 +9,9 @@ pub(super) const PRIOR_OF_FUNCTIONS: f64 = 0.25;
 /// Prior weight of the bending of links that are declared rigid, relative to another family of
 /// effects. Most of an arm's compliance is in its joints.
 pub(super) const PRIOR_OF_RIGID_LINKS: f64 = 0.1;
+/// Prior weight of an error of scale or of squareness of the instrument, relative to another family
+/// of effects. Instruments are calibrated against lengths, arms are not.
+pub(super) const PRIOR_OF_INSTRUMENT_SCALE: f64 = 0.1;
 /// Prior probability that the next effect of a set belongs to a family that the set already
 /// contains: an effect of one joint often occurs at others.
 pub(super) const PRIOR_OF_SAME_FAMILY: f64 = 0.25;
@@ -129,6 +132,8 @@ pub(super) const CROSS_VALIDATION_BLOCKS: usize = 10;
 pub(super) const MAX_CORRECTED_ERROR: f64 = 0.95;
 /// Smallest odds of another effect over a found one at which it is reported as an alternative.
 pub(super) const MIN_ALTERNATIVE_ODDS: f64 = 0.05;
+/// Maximum number of alternatives of a probable effect that are fitted in its place.
+pub(super) const MAX_FITTED_ALTERNATIVES: usize = 2;
 /// Number of random subsets of the configurations by which the stability of a finding is measured.
 pub(super) const SUBSETS: u64 = 20;
 /// Smallest fraction of these subsets in which an effect must be found for its stated probability

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use crate::common::arms::{parse, path};
 use crate::common::made::model_of;
-use crate::common::program::{Folder, assert_contains};
+use crate::common::program::{Folder, Run, assert_contains};
 use crate::common::reading::{read_dataset, read_table};
 
 fn case(name: &str) -> PathBuf {
@@ -325,6 +325,44 @@ fn errors_of_the_instrument_are_no_errors_of_the_arm() {
     {
         assert!((target - there).norm() < 1e-8, "{} m off", (target - there).norm());
     }
+}
+
+#[test]
+fn bounds_of_commands_hold_whichever_effect_acts() {
+    let folder = Folder::with_lunar_sampler();
+    let text = folder.read("problem.toml") + "\n[[effect]]\ntracker-scale = true\n";
+    folder.write("problem.toml", text);
+    folder.flexcal("identify . --out out");
+    let command = "compensate . --estimate out/estimate.json --data a-none.csv --frame measuring --out c --json";
+    let alone = folder.flexcal(command);
+    assert_contains(&alone.stderr, &["targets are true positions"]);
+    let name = alone.json()["problem"].clone();
+    let side = |declaration: &str, description: &str, parameter: &str, value: f64| {
+        serde_json::json!({
+            "declaration": declaration, "description": description, "status": "probable",
+            "claims": { "law": { "probability": 0.8 } }, "probability": 0.2,
+            "parameters": [{ "name": parameter, "estimate": value }],
+        })
+    };
+    let mut found = side("tracker-scale = true", "the scale is off", "tracker-scale.error", 1e-3);
+    let ratio = "gear-ratio = { joint = 1 }";
+    found["alternatives"] =
+        serde_json::json!([side(ratio, "joint 1 is off", "gear-ratio[1].error", 1e-3)]);
+    let written = serde_json::json!({ "problem": name, "effects": [found] });
+    folder.write("loop.json", written.to_string());
+    let both = folder.flexcal(command);
+    let said =
+        "did not decide whether the scale is off or, with 20 %, joint 1 is off: in that case";
+    assert_contains(&both.stderr, &[said]);
+    let bound = |run: &Run| run.json()["mean_bound_mm"].as_f64().unwrap();
+    // The targets are some metres from the instrument, whose readings err by 1 mm per metre.
+    let more = bound(&both) - bound(&alone);
+    assert!(more > 0.5, "{more} mm");
+    // With a scale that is known to be right, there is nothing to decide.
+    let text = folder.read("problem.toml") + "\n[parameters.\"tracker-scale*\"]\nfixed = true\n";
+    folder.write("problem.toml", text);
+    folder.flexcal("identify . --out out");
+    assert!(!folder.flexcal(command).stderr.contains("did not decide"));
 }
 
 #[test]

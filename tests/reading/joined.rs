@@ -51,6 +51,34 @@ fn dates_of_the_joint_table_are_times_under_either_name() {
 }
 
 #[test]
+fn dates_are_paired_with_milliseconds_since_the_start_of_a_controller() {
+    let second = |k: u32| 20 * k + k * k % 13;
+    let date = |k: u32| format!("2026-03-11T09:{:02}:{:02}Z", second(k) / 60, second(k) % 60);
+    let measured: String = (0..12).map(|k| format!("{k},2,3,{}\n", date(k))).collect();
+    let logged: String =
+        (0..12).map(|k| format!("{},{k},7\n", 1000 * second(k) + 5_000_000)).collect();
+    let read = |more: &str| {
+        let text = format!(
+            "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['log.csv'], by = 'time'{more} }}\n\
+             [data.columns]\n'When' = 'time'\n't_ms' = 'time_ms'\n"
+        );
+        let folder = Folder::with([
+            ("problem.toml", &*text),
+            ("tracker.csv", &*format!("x_mm,y_mm,z_mm,When\n{measured}")),
+            ("log.csv", &*format!("t_ms,q1_deg,q2_deg\n{logged}")),
+        ]);
+        let problem = Problem::read(&folder.path("problem.toml"))?;
+        Measurements::read(&problem.data.files, &problem)
+    };
+    // 2026-03-11T09:00Z, without the 5000 s since the start.
+    let offset = "offset_s = 1773214600.0";
+    assert_says(&read("").unwrap_err(), &[&format!("write {offset} in joints")]);
+    let (rows, _) = read(&format!(", {offset}")).unwrap();
+    assert!(rows.has_dates() && rows.len() == 12);
+    assert!((rows.configuration(11)[0].to_degrees() - 11.0).abs() < 1e-9);
+}
+
+#[test]
 fn errors_show_the_line_of_the_file_they_name() {
     let shown = |error: InputError| {
         let excerpt = error.location.excerpt.clone().unwrap();

@@ -22,7 +22,7 @@ pub fn commands_reach(case: &Case, fit: &Fitted, world: &World) -> Result<usize,
     let read = Measurements::read_poses(&problem.data.files, &problem);
     let targets = read.map_err(|error| format!("targets are not read: {error}"))?.0;
     let few: Vec<usize> = (0..targets.len()).step_by(4).collect();
-    let fitted = (&fit.saved, fit.correction.as_ref());
+    let fitted = (&fit.saved, fit.correction.as_ref(), &[][..]);
     let found =
         Compensation::new(&problem, fitted, targets.select(&few), TargetFrame::Measuring, 0.95);
     let found = found.map_err(|error| format!("no commands: {error}"))?;

@@ -163,7 +163,7 @@ pub fn judged(k: u64, folder: &Path) -> Result<&'static str, String> {
 /// Checks that the commands for the measured positions bring the arm there by its own predictions.
 fn commands_reach(fit: &Fitted) -> Verdict {
     let targets = fit.data.measurements.select(&[0, 5, 11]);
-    let fitted = (&fit.saved, fit.correction.as_ref());
+    let fitted = (&fit.saved, fit.correction.as_ref(), &[][..]);
     let found =
         Compensation::new(&fit.problem, fitted, targets.clone(), TargetFrame::Measuring, 0.95);
     let found = found.map_err(|error| format!("no commands: {error}"))?;

@@ -28,6 +28,10 @@ const MAX_SIGMAS_LEFT_BY_MASS: f64 = 1.5;
 /// priors, at which the text states the residual.
 const MAX_PLAIN_PART: f64 = 0.8;
 
+/// Largest deviation from 1 of a ratio of motion to command, or of a scale, that an arm or an
+/// instrument may have, so that the remedy also names its effect.
+const MAX_RATIO_ERROR_OF_ARM: f64 = 0.03;
+
 /// Largest ratio of the rms residual with strategy joint to that of the fit, at which the strategy
 /// causes the residual, not the reading of table or problem.
 const MAX_JOINT_RATIO: f64 = 0.2;
@@ -93,6 +97,17 @@ impl Check for ReadAsMeant {
         let [rest, as_read] =
             [best.rms, explanations.as_read].map(|error| format_error(name, error, 3));
         let numbers = [json!(words), explanations.as_read.into(), best.rms.into()];
+        let of_arm = best.effect.as_ref().filter(|(_, size)| size.abs() < MAX_RATIO_ERROR_OF_ARM);
+        let found = |text: String| {
+            let finding = Finding::new(FindingCode::Misread, numbers.clone(), text);
+            let Some((effect, _)) = of_arm else { return finding };
+            let remedy = format!(
+                "{}; if nothing is wrong there, flexcal loop adds {}",
+                finding.remedy,
+                effect.declaration()
+            );
+            finding.with_remedy(remedy)
+        };
         if is_noise {
             // Parameters far beyond their priors may fit the table as it was read.
             let instead = if rms < MAX_PLAIN_PART * explanations.as_read {
@@ -108,7 +123,7 @@ impl Check for ReadAsMeant {
                 "the measurements fit if they are read in another way: with {named}{more}, the rms \
                  error would be {instead}"
             );
-            return vec![Finding::new(FindingCode::Misread, numbers, text)];
+            return vec![found(text)];
         }
         let is_clear = best.rms <= MAX_CLEAR_RATIO * explanations.as_read;
         if is_clear {
@@ -117,13 +132,13 @@ impl Check for ReadAsMeant {
                  {named}{more}, the rms error would be {rest} (as read {as_read}). That is still \
                  more than the declared σ: the model lacks something, or another mistake remains"
             );
-            return vec![Finding::new(FindingCode::Misread, numbers, text)];
+            return vec![found(text)];
         }
         // Another cause may leave as much.
         let text = format!(
             "the error of {as_read} has no explanation yet; it would fall to {rest}, which is still more than the declared σ, with {named}{more}"
         );
         let remedy = "check that and what acts alike; the model may also lack something".to_owned();
-        vec![Finding::new(FindingCode::Misread, numbers, text).with_remedy(remedy)]
+        vec![found(text).with_remedy(remedy)]
     }
 }

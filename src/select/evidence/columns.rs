@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, scaled_to_equal_length};
-use super::families::{Families, OtherHypotheses, ln_family};
+use super::families::{Families, OtherHypotheses, ln_family, share};
 use super::functions::{
     SampledCovariate, are_combined, expand, merge, products_of, scaled_functions,
 };
@@ -144,7 +144,8 @@ impl<'a, 'l> Columns<'a, 'l> {
             match candidate_of(effect, columns.clone(), self.problem, measured) {
                 Some(candidate) => {
                     self.candidates.push(candidate);
-                    self.shares.push((effect.name().to_owned(), 1.0 / tries));
+                    let share = share(effect, tries, self.problem);
+                    self.shares.push((effect.name().to_owned(), share));
                 }
                 None => self.unseen.push(effect.clone()),
             }

@@ -2,8 +2,10 @@
 //! probability is divided between families by their weights, and within a family by the shares of
 //! its members.
 
-use crate::problem::Effect;
-use crate::select::settings::{PRIOR_OF_FUNCTIONS, PRIOR_OF_RIGID_LINKS};
+use crate::problem::{Effect, Problem};
+use crate::select::settings::{
+    PRIOR_OF_FUNCTIONS, PRIOR_OF_INSTRUMENT_SCALE, PRIOR_OF_RIGID_LINKS,
+};
 
 /// Families of the hypotheses about a residual. A family holds the effects of one name, or the
 /// functions without a law of one type.
@@ -37,6 +39,7 @@ impl Families {
         }
         let weight = match effect {
             Some(Effect::LinkBending { .. }) => PRIOR_OF_RIGID_LINKS,
+            Some(Effect::TrackerScale | Effect::FrameStrain) => PRIOR_OF_INSTRUMENT_SCALE,
             Some(_) => 1.0,
             None => PRIOR_OF_FUNCTIONS,
         };
@@ -60,8 +63,54 @@ impl Families {
     }
 }
 
+/// Returns the share of an effect in the prior probability of its family. `tries` is the number of
+/// values that are tried of its searched argument.
+///
+/// Wrong transmission ratios of all sliding joints together are as probable as those of all
+/// revolute joints: a gear has whole numbers of teeth, while racks, belts and screws have errors
+/// of pitch.
+pub(super) fn share(effect: &Effect, tries: f64, problem: &Problem) -> f64 {
+    let slides = problem.slides();
+    let sliding = slides.iter().filter(|slides| **slides).count();
+    let weight = match *effect {
+        Effect::GearRatio { joint } if slides.get(joint.wrapping_sub(1)) == Some(&true) => {
+            ((slides.len() - sliding) as f64 / sliding as f64).max(1.0)
+        }
+        _ => 1.0,
+    };
+    weight / tries
+}
+
 /// Returns ln of the prior probability of a family of effects, given the summed weight of all
 /// families.
 pub(super) fn ln_family(total_weight: f64) -> f64 {
     -(2.0 * total_weight.max(1.0)).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rail_is_suspected_before_the_scale_of_a_calibrated_instrument() {
+        let joint = |kind: &str| format!("{{ kind = \"{kind}\", d_mm = 300, a_mm = 200 }}");
+        let joints: Vec<String> =
+            ["prismatic"].into_iter().chain(["revolute"; 6]).map(joint).collect();
+        let text = format!(
+            "dh = \"standard\"\njoint = [{}]\n[data]\nfiles = [\"m.csv\"]\nposition_sigma_mm = 0.1\n",
+            joints.join(", ")
+        );
+        let problem = Problem::parse(&text, std::path::Path::new("problem.toml")).unwrap();
+        let mut families = Families::default();
+        let ratios = (1..=7).map(|joint| Effect::GearRatio { joint });
+        for effect in ratios.chain([Effect::TrackerScale]) {
+            families.add(effect.name(), share(&effect, 1.0, &problem), Some(&effect));
+        }
+        let ln = |effect: Effect| {
+            families.ln_prior(effect.name(), share(&effect, 1.0, &problem), families.weight(false))
+        };
+        let over = |other: Effect| (ln(Effect::GearRatio { joint: 1 }) - ln(other)).exp();
+        assert!((over(Effect::TrackerScale) - 5.0).abs() < 1e-9);
+        assert!((over(Effect::GearRatio { joint: 2 }) - 6.0).abs() < 1e-9);
+    }
 }

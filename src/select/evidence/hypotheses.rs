@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::block::Design;
 use super::candidate::{Candidate, joint_and_order, scaled_to_equal_length};
 use super::columns::{Columns, candidate_of};
-use super::families::{Families, OtherHypotheses, ln_family};
+use super::families::{Families, OtherHypotheses, ln_family, share};
 use super::functions::{SampledCovariate, Shape};
 use super::hypothesis::{Hypothesis, HypothesisSet};
 use super::limits::limits;
@@ -214,19 +214,20 @@ impl<'a> Hypotheses<'a> {
         let (mut added_candidates, mut shares) = (Vec::new(), Vec::new());
         let mut listed_added = listed_added.into_iter();
         for (effect, tries) in listed.iter().zip(tries) {
+            let share = share(effect, tries, problem);
             let is_seen = match listed_added.next() {
                 Some((_, columns)) => {
                     let candidate =
                         candidate_of(effect, columns, problem, (coverage, evidence_poses));
                     let is_seen = candidate.is_some();
-                    shares.extend(candidate.is_some().then(|| 1.0 / tries));
+                    shares.extend(candidate.is_some().then_some(share));
                     added_candidates.extend(candidate);
                     is_seen
                 }
                 None => !others.unseen.contains(effect),
             };
             if is_seen {
-                families.add(effect.name(), 1.0 / tries, Some(effect));
+                families.add(effect.name(), share, Some(effect));
             }
         }
         let total_weight = families.weight(false) + others.weight_of_functions;

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::found::{Found, found};
+use super::gravity::other_gravity;
 use super::misread_effect::with_misread_effect;
 use super::search::search;
 use super::state::{Round, SearchState};
@@ -232,8 +233,10 @@ pub fn close_by(
     let mut with_orientations = fitted.problem.clone();
     with_orientations.data.fits_orientation = problem.data.fits_orientation;
     let orientations = orientation_finding(&with_orientations, &data, &unstoppable);
+    let is_open = verdict == Verdict::Unexplained && !interrupted;
+    let gravity = is_open.then(|| other_gravity(&state, &declared, &fitted)).flatten();
     let mut after = fitted.found;
-    after.findings.splice(0..0, orientations);
+    after.findings.splice(0..0, orientations.into_iter().chain(gravity));
     if !interrupted {
         after.findings.iter_mut().for_each(Finding::set_remedy_after_loop);
     }

@@ -20,7 +20,9 @@ use crate::select::harmonic_prior::is_periodic_of_many_orders;
 use crate::select::left_out_gain::LeftOutGain;
 use crate::select::neighbourhood::tries;
 use crate::select::reference_check::{ReferenceCheck, reference_check};
-use crate::select::settings::{MIN_ALTERNATIVE_ODDS, MIN_SHARE_OF_SUBSETS};
+use crate::select::settings::{
+    MAX_FITTED_ALTERNATIVES, MIN_ALTERNATIVE_ODDS, MIN_SHARE_OF_SUBSETS,
+};
 
 /// Smallest number of orders of one harmonic at which only the claim is made that some of the
 /// orders act, not all.
@@ -47,6 +49,8 @@ pub struct Found {
     /// Effects that the data cannot distinguish from the found one, best first, each with the
     /// probability that it acts instead.
     pub alternatives: Vec<(Effect, f64)>,
+    /// The most probable alternatives of a probable effect, each fitted in its place.
+    pub compared: Vec<Compared>,
     /// Quantities of a law that the search composed, with their ranges over the identification
     /// poses (SI, temperatures in °C); empty for other effects. Beyond these ranges the law is not
     /// supported by data.
@@ -180,6 +184,7 @@ pub(super) fn found(
             held_out_after: held_out_after(&effect),
             ranges: if effect.is_composed() { ranges(fitted, data, &effect) } else { Vec::new() },
             alternatives,
+            compared: Vec::new(),
             reference_check: check,
             effect,
         }
@@ -192,7 +197,11 @@ pub(super) fn found(
     match best {
         Some(best) if is_used(on_all_rows.iter().map(|found| found.status_of_any).min()) => {
             let subsets = subset_evidence(fitted, data, best, &reconsidered);
-            if subsets.is_empty() { on_all_rows } else { all(&subsets) }
+            let mut effects = if subsets.is_empty() { on_all_rows } else { all(&subsets) };
+            for found in effects.iter_mut().filter(|found| found.status == Status::Probable) {
+                found.compared = compare_alternatives(state, fitted, found);
+            }
+            effects
         }
         _ => on_all_rows,
     }
@@ -310,6 +319,37 @@ fn alternatives(
         });
     }
     found
+}
+
+/// Alternative of an effect, fitted in its place.
+#[derive(Debug, Clone)]
+pub struct Compared {
+    /// Effect that was fitted.
+    pub effect: Effect,
+    /// ln of the odds of the found effect over this one by their predictions of poses that are left
+    /// out, without the prior probabilities of the two.
+    pub ln_odds: f64,
+    /// Estimates of its parameters.
+    pub estimates: Vec<Estimate>,
+}
+
+/// Fits the most probable alternatives of a found effect in its place, and compares the predictions
+/// of left-out poses.
+fn compare_alternatives(state: &SearchState, fitted: &Fitted, found: &Found) -> Vec<Compared> {
+    let mut others = state.added(fitted);
+    others.retain(|other| *other != found.effect);
+    let compared = |(effect, _): &(Effect, f64)| {
+        let effects = [others.as_slice(), std::slice::from_ref(effect)].concat();
+        let rival = state.fit(fitted, &effects).ok()?;
+        let gain = LeftOutGain::new(fitted, &rival, state.data)?;
+        let parameters = rival.parameters_of(effect).into_iter();
+        Some(Compared {
+            effect: effect.clone(),
+            ln_odds: gain.ln_odds(fitted.sigma.min(rival.sigma)),
+            estimates: parameters.map(|k| rival.found.estimates[k].clone()).collect(),
+        })
+    };
+    found.alternatives.iter().take(MAX_FITTED_ALTERNATIVES).filter_map(compared).collect()
 }
 
 /// Effect of a fit, and plainer effects that may act in its place.

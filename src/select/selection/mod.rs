@@ -8,12 +8,14 @@
 //!   poses.
 //! - `remainder`: corrects what no sure law explains.
 //! - `misread_effect`: the effect that expresses a misread table, with which the search begins.
+//! - `gravity`: another direction of gravity that would explain what no law does.
 //! - `found`: the claims about each effect, compared with plainer causes that together do the same.
 //! - `status`: the status of each effect, and the verdict.
 
 mod close;
 mod found;
 mod gears;
+mod gravity;
 mod misread_effect;
 mod remainder;
 mod search;
@@ -22,6 +24,6 @@ mod status;
 
 pub use crate::numeric::Interval;
 pub use close::{ClosedLoop, close, close_by};
-pub use found::Found;
+pub use found::{Compared, Found};
 pub use state::Round;
 pub use status::{Status, Verdict};

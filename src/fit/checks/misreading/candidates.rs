@@ -314,11 +314,14 @@ pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreadin
         let of_joint = |power| Misreading::Stiffness { joint, power };
         misreadings.extend([-3, -1, 1, 3, 0].map(of_joint));
     }
-    for axis in 0..3 {
-        let of_sign = |is_negative| Misreading::Gravity { axis, is_negative };
-        misreadings.extend([false, true].map(of_sign));
-    }
+    misreadings.extend(of_gravity());
     misreadings
+}
+
+/// Returns gravity along each axis of the base, in both directions.
+pub(super) fn of_gravity() -> impl Iterator<Item = Misreading> {
+    let along = |axis| [false, true].map(|is_negative| Misreading::Gravity { axis, is_negative });
+    (0..3).flat_map(along)
 }
 
 /// Returns the declared lengths of a joint \[m\]: a, d, and the translation of its placement.

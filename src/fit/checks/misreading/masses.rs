@@ -1,7 +1,7 @@
 //! Search for wrong masses, places of masses and suspension forces of an arm that gives way.
 
 use super::Misreading;
-use super::candidates::{MASS_SCALES, of_hoists, of_masses, of_places};
+use super::candidates::{MASS_SCALES, of_gravity, of_hoists, of_masses, of_places};
 use super::explanation::Explanations;
 use super::search::Trial;
 use crate::fit::checks::checked_fit::CheckedFit;
@@ -36,6 +36,7 @@ pub(in crate::fit) fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanatio
     let mut tested = of_masses(fit.problem, measurements, &MASS_SCALES);
     tested.extend(of_places(fit.problem, measurements));
     tested.extend(of_hoists(fit.problem));
+    tested.extend(of_gravity());
     let has_payloads = measurements.payload.is_some();
     let shifts = [-1, 1].map(|by| Misreading::ShiftedPayload { by });
     tested.extend(shifts.into_iter().filter(|_| has_payloads));
