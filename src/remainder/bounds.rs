@@ -18,8 +18,11 @@ pub struct Bounds {
     pub level: f64,
     /// Correction and uncertainty of the prediction in each pose.
     pub poses: Vec<CorrectedPose>,
-    /// Ratio of a pose's error bound to its expected error length ([`CorrectedPose::size`]).
+    /// Ratio of a pose's error bound to its predicted error length ([`CorrectedPose::size`]).
     factor: f64,
+    /// Ratio of the root mean square of left-out errors to their predicted lengths; 1 if no
+    /// configuration was left out.
+    scale: f64,
     /// Number of configurations whose left-out errors determine `factor`.
     learned_from: usize,
 }
@@ -85,7 +88,13 @@ impl Bounds {
     /// Creates the bounds at probability `level` for poses that `correction` corrected.
     pub fn new(correction: &Correction, poses: Vec<CorrectedPose>, level: f64) -> Self {
         let scores = &correction.scores;
-        Self { level, poses, factor: scores.quantile(level), learned_from: scores.configurations }
+        Self {
+            level,
+            poses,
+            factor: scores.quantile(level),
+            scale: scores.scale().unwrap_or(1.0),
+            learned_from: scores.configurations,
+        }
     }
 
     /// Compares the bounds with errors that were not fitted. `errors` has for each of them the
@@ -117,6 +126,12 @@ impl Bounds {
         self.factor * self.poses[pose].size
     }
 
+    /// Returns the expected root mean square of a pose's error length \[m\]: the predicted one, scaled
+    /// by the errors of left-out configurations, as bounds are.
+    pub(crate) fn expected_at(&self, pose: usize) -> f64 {
+        self.scale * self.poses[pose].size
+    }
+
     /// Returns the mean of the error bounds over the poses \[m\]; NaN if there are none.
     pub fn mean(&self) -> f64 {
         let bounds = (0..self.poses.len()).map(|pose| self.bound(pose));
@@ -125,7 +140,7 @@ impl Bounds {
 
     /// Returns the expected root mean square of the error length over all poses \[m\].
     pub fn expected(&self) -> f64 {
-        let squares = self.poses.iter().map(|pose| pose.size * pose.size);
+        let squares = (0..self.poses.len()).map(|pose| self.expected_at(pose).powi(2));
         (squares.sum::<f64>() / self.poses.len() as f64).sqrt()
     }
 
