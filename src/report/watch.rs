@@ -81,7 +81,7 @@ pub(crate) fn watch(
             in_unit(watch.expected_error)
         );
         let notes = [
-            "probability: among all causes that were tried, given that something changed; a cause that was not tried has none",
+            "probability: among all causes that were tried, given that something changed",
             left.as_str(),
             "more poses: number of further poses like these that would distinguish this cause from the next one; –: none would",
         ];
