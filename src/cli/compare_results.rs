@@ -59,18 +59,20 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !quiet && real[0].is_some() && real[0] == real[1] {
         diagnostic::warn(&format!("A and B are the same file: {}", first.display()));
     }
-    if !quiet && sides[0].estimate.problem_name() != sides[1].estimate.problem_name() {
+    let is_second_better = report::predicts_better(&sides);
+    let are_named_alike = sides[0].estimate.problem_name() == sides[1].estimate.problem_name();
+    if !quiet && is_second_better.is_some() && !are_named_alike {
         diagnostic::warn("the two results are of problems with different names");
     }
     let story = report::difference(&sides);
     results.write(&[(PAGE_FILE, &story.page())])?;
     if !quiet {
-        let better = shell_word(if report::predicts_better(&sides) { second } else { first });
-        output::print(&format!(
-            "{}{}Next: flexcal watch PROBLEM --estimate {better} --data FILE says whether new rows contradict an estimate\n",
-            story.text(),
-            results.written()
-        ))?;
+        // Nothing follows from two results of different arms.
+        let next = is_second_better.map_or_else(String::new, |is_second_better| {
+            let better = shell_word(if is_second_better { second } else { first });
+            format!("Next: flexcal watch PROBLEM --estimate {better} --data FILE says whether new rows contradict an estimate\n")
+        });
+        output::print(&format!("{}{}{next}", story.text(), results.written()))?;
     }
     Ok(Outcome::Done)
 }

@@ -58,7 +58,7 @@ use outcome::Outcome;
   flexcal identify problems/lunar-sampler
   flexcal help identify
 
-Exit status: 0 done; 1 the result is not to be trusted, or does not meet what was asked (accept, next); \
+Exit status: 0 done; 1 the result is not to be trusted, or does not meet what was asked (accept; next if further poses gain nothing); \
 2 bad input; 3 the arm has changed (watch); 130 interrupted."
 )]
 struct Cli {

@@ -9,6 +9,7 @@ use super::{DesignError, Extremes, Forecast, Growth, Prediction, Sensitivity, Si
 use crate::error::InputErrorKind;
 use crate::fit::Placement;
 use crate::measurement::{Dataset, Labels, Measurements, RowOrder, count_distinct};
+use crate::observation::Needs;
 use crate::problem::{Observation, PoseRanges, Problem};
 use crate::select::{Detection, detectable};
 
@@ -69,8 +70,8 @@ pub struct Check {
     pub prediction: Prediction,
     /// Poses at which the prediction is evaluated.
     pub(crate) predicted_at: PredictionPoses,
-    /// Root mean square length of the error of one measured position \[m\]; `None` if only tilts
-    /// are measured.
+    /// Root mean square length of the error of one measured position \[m\]; `None` if no length is
+    /// measured.
     pub noise: Option<f64>,
     /// Kind of measurement that has this noise: the first kind in the table that is a length
     /// ([`Observation::kind`]).
@@ -86,6 +87,8 @@ pub struct Check {
     pub distinct_coordinates: usize,
     /// Number of checked poses that differ from one another.
     pub distinct_poses: usize,
+    /// Noun for a checked row: "point" if rows are points in images, else "pose".
+    pub(crate) row_noun: &'static str,
     /// Number of free parameters without a prior.
     pub without_prior: usize,
     /// Statement that the checked poses leave the scale open, with a remedy; `None` if they
@@ -174,6 +177,11 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
             sensitivity.coordinates,
             first_rows(&poses.pose_numbers(problem)),
         ),
+        row_noun: if poses.leading().description().needs == Needs::Carriers {
+            "point"
+        } else {
+            "pose"
+        },
         distinct_poses: count_distinct(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
         open_scale: {

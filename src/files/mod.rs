@@ -100,7 +100,8 @@ fn escape_cell(word: String) -> String {
     if is_formula(&word) { format!("'{word}") } else { word }
 }
 
-/// Returns the word of a cell without the apostrophe that protects it from spreadsheets.
+/// Returns the word of a cell without the apostrophe that protects it from spreadsheets, if it
+/// stands before a formula.
 pub(crate) fn unescape_cell(cell: &str) -> &str {
     cell.strip_prefix('\'').filter(|word| is_formula(word)).unwrap_or(cell)
 }

@@ -353,24 +353,18 @@ impl Law {
 
     /// Returns the description of the law in words.
     pub(super) fn describe(&self) -> String {
-        if self.composition.is_some() {
-            let place = self.place_in_words();
-            let formulas = self.formulas();
-            return match formulas.split_last() {
-                Some((last, [])) => format!("{place} errs by a multiple of {last}"),
-                Some((last, rest)) => {
-                    format!("{place} errs by multiples of {} and {last}", rest.join(", "))
-                }
-                None => place,
-            };
-        }
-        let formulas = self.formulas();
-        let terms = match formulas.split_last() {
-            Some((last, [])) => format!("a multiple of {last}"),
-            Some((last, rest)) => format!("multiples of {} and {last}", rest.join(", ")),
-            None => "nothing".to_owned(),
+        let (place, formulas) = (self.place_in_words(), self.formulas());
+        let errs = match formulas.split_last() {
+            Some((last, [])) => format!("{place} errs by a multiple of {last}"),
+            Some((last, rest)) => {
+                format!("{place} errs by multiples of {} and {last}", rest.join(", "))
+            }
+            None => place,
         };
-        format!("the law “{}” changes {} by {terms}", self.name, self.place_in_words())
+        if self.composition.is_some() {
+            return errs;
+        }
+        format!("{errs} (law “{}”)", self.name)
     }
 
     /// Returns the first term that converts an angle between degrees and radians, and its factor.

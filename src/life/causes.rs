@@ -440,7 +440,7 @@ impl Extended {
         let sizes = STRAIN_SIZES.map(|size| part * size);
         let expansion = ("strain of all links".to_owned(), unit);
         let mut causes = vec![thermal(
-            "temperature: all links expand".to_owned(),
+            "all links expand with temperature".to_owned(),
             (all, &lengths),
             expansion,
             &sizes,
@@ -451,7 +451,7 @@ impl Extended {
             let column = rows.add_column(&moved, of_row);
             let number = joint + 1;
             let amplitude = (format!("joint{number}.theta per kelvin"), Unit::AnglePerDegree);
-            let label = format!("temperature: zero of joint {number} follows it");
+            let label = format!("zero of joint {number} drifts with temperature");
             causes.push(thermal(label, (column, &moved), amplitude, &JOINT_THERMAL_SIZES));
         }
         causes

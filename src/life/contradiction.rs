@@ -63,9 +63,9 @@ impl Contradiction {
         }
     }
 
-    /// Returns the finding that the new rows contradict the prior in `file`. `index` is the number
-    /// of causes that were found before this one.
-    fn finding(&self, index: usize, file: &Path) -> Finding {
+    /// Returns the finding that the new rows contradict the prior in `file`, which is that of a
+    /// fleet if `is_of_fleet`. `index` is the number of causes that were found before this one.
+    fn finding(&self, index: usize, (file, is_of_fleet): (&Path, bool)) -> Finding {
         let is_refitted = self.relocated.is_some() || !self.widened.is_empty();
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
             _ if self.relocated.is_some() => {
@@ -86,7 +86,9 @@ impl Contradiction {
                     .to_owned()
             }
             (false, _) => "; the prior of its parameters was widened".to_owned(),
-            (true, Some(ratio)) => format!("; the fit assumes {ratio:.1} times the earlier σ"),
+            (true, Some(ratio)) => {
+                format!("; the fit assumes {ratio:.1} times the σ that the earlier fit assumed")
+            }
             (true, None) => String::new(),
         };
         let still = if index == 0 { "" } else { "with that, they still do; " };
@@ -106,13 +108,20 @@ impl Contradiction {
             file.display()
         );
         let numbers = [json!(self.label), self.probability.into(), json!(is_refitted)];
+        let remedy = if is_of_fleet {
+            "find how this arm differs from those of the fleet"
+        } else {
+            "find what happened to the arm since that estimate (flexcal watch tells)"
+        };
         Finding::new(FindingCode::EarlierEstimateContradicted, numbers, text)
+            .with_remedy(remedy.to_owned())
     }
 }
 
-/// Returns the findings that new rows contradict the prior in `file`, one for each of the `causes`.
-pub(super) fn findings(causes: &[Contradiction], file: &Path) -> Vec<Finding> {
-    causes.iter().enumerate().map(|(k, cause)| cause.finding(k, file)).collect()
+/// Returns the findings that new rows contradict the prior in a file, one for each of the `causes`.
+/// `prior` is the file, and whether it is of a fleet.
+pub(super) fn findings(causes: &[Contradiction], prior: (&Path, bool)) -> Vec<Finding> {
+    causes.iter().enumerate().map(|(k, cause)| cause.finding(k, prior)).collect()
 }
 
 /// Rewrites findings on a fit that a contradicted prior in `file` forces: they say nothing of table,
@@ -172,7 +181,7 @@ pub(super) fn most_probable(
     };
     // A misfit that no cause explains looks like noise.
     let label = match cause.kind {
-        CauseKind::Noise => "larger noise, or something that the model lacks".to_owned(),
+        CauseKind::Noise => "larger noise or something that the model lacks".to_owned(),
         _ => first.label(causes, location),
     };
     Some(Contradiction {

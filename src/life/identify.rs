@@ -154,7 +154,8 @@ pub(super) fn identified(
                 let chi2 = chi2.map(|(chi2, coordinates, _)| (chi2, coordinates));
                 contradiction::attribute_to_prior(&mut found.findings, source.file(), chi2);
             }
-            found.findings.extend(contradiction::findings(&causes, source.file()));
+            let of = (source.file(), original.includes_fleet);
+            found.findings.extend(contradiction::findings(&causes, of));
             found.fitted_rows.extend(original.fitted_rows.iter().cloned());
             found.fitted_rows.sort();
             found.fitted_rows.dedup();

@@ -33,9 +33,11 @@ const MIN_REPORTED_PROBABILITY: f64 = 0.005;
 /// the rows.
 pub(crate) const MIN_EXPECTED_P: f64 = 0.01;
 /// Smallest ratio of the error that a named cause leaves to the expected one at which the cause is
-/// not the whole change: four times the variance, which nine coordinates reach by chance in less
-/// than 0.01 %.
-const MIN_UNEXPLAINED_RATIO: f64 = 2.0;
+/// not the whole change, or not the right one. Causes are linear in the change, so that the right
+/// one, if large, may leave a little more than is expected.
+const MIN_UNEXPLAINED_RATIO: f64 = 1.5;
+/// Largest probability that chance alone leaves such an error.
+const MAX_UNEXPLAINED_CHANCE: f64 = 1e-4;
 /// Smallest number of measured positions that determine a moved base and test the fit.
 const MIN_BASE_ROWS: usize = 4;
 /// Smallest ratio of the two largest principal variances of points that are not on a line.
@@ -110,10 +112,13 @@ impl Watch {
     }
 
     /// Returns the error of left-out rows with the named cause updated \[m\] or \[rad\], if it is so
-    /// much larger than expected that something else has changed or drifted as well.
+    /// much larger than expected that something else has changed or drifted, instead or as well.
     pub fn unexplained_error(&self) -> Option<f64> {
         let left = self.named()?.left_out_error?;
-        (left > MIN_UNEXPLAINED_RATIO * self.expected_error).then_some(left)
+        let coordinates = self.chi2.1;
+        let chi2 = ChiSquared::new(coordinates).ok()?.inverse_cdf(1.0 - MAX_UNEXPLAINED_CHANCE);
+        let ratio = (chi2 / coordinates).sqrt().max(MIN_UNEXPLAINED_RATIO);
+        (left > ratio * self.expected_error).then_some(left)
     }
 }
 
@@ -142,7 +147,8 @@ pub fn watch(
     if new.is_empty() {
         return Err(PriorError::NothingNew { file: estimate.file.clone(), rows: left_out });
     }
-    let kept = if left_out > 0 { measurements.select(&new) } else { measurements.clone() };
+    let kept =
+        if left_out > 0 { measurements.select_with_past(&new) } else { measurements.clone() };
     let placement = Placement::of(&kept);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let earlier = Earlier::of_estimate(estimate, problem, &model, days)?;

@@ -62,7 +62,8 @@ pub(super) struct JoinedLog {
     unlike_pairs: Vec<[String; 2]>,
     /// Times of the measured rows \[s\], for a join by time.
     times: Vec<f64>,
-    /// Column of the times in the current table, for a join by order.
+    /// Column of the times in the current table of measurements, with which pairs that are joined
+    /// by order are checked; `None` without such a column or for other joins.
     clock: Option<Key>,
     /// Times of the pairs that are joined by order.
     timed_pairs: Vec<TimedPair>,

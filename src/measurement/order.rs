@@ -110,6 +110,28 @@ impl Measurements {
         Some(Warning { location: self.location(row), kind })
     }
 
+    /// Returns a copy with the given rows, as [`select`](Self::select) does. The past of each row
+    /// still consists of all rows of this table, until the copy is copied again.
+    pub(crate) fn select_with_past(&self, rows: &[usize]) -> Self {
+        let Chronology { places, sorted } = self.chronology();
+        let columns = || self.columns().to_owned();
+        let order = Chronology {
+            places: rows.iter().map(|&row| places[row]).collect(),
+            sorted: Some(sorted.clone().unwrap_or_else(columns)),
+        };
+        Self { order: RowOrder(OnceLock::from(order)), ..self.select(rows) }
+    }
+
+    /// Returns the columns on which the past of a pose depends, in the order of the rows.
+    fn columns(&self) -> Past<&[f64]> {
+        Past {
+            times: &self.time,
+            temperatures: self.temperature.as_deref().unwrap_or_default(),
+            configurations: &self.configurations,
+            approaches: self.approach.as_deref().unwrap_or_default(),
+        }
+    }
+
     /// Returns the chronological order, which is computed at the first call.
     fn chronology(&self) -> &Chronology {
         self.order.0.get_or_init(|| Chronology::new(self))
@@ -125,15 +147,7 @@ impl PoseTable for Measurements {
             return Past::default();
         };
         let n = self.joints;
-        let columns = match sorted {
-            Some(sorted) => sorted.view(),
-            None => Past {
-                times: self.time.as_slice(),
-                temperatures: self.temperature.as_deref().unwrap_or_default(),
-                configurations: &self.configurations,
-                approaches: self.approach.as_deref().unwrap_or_default(),
-            },
-        };
+        let columns = sorted.as_ref().map_or_else(|| self.columns(), Past::view);
         Past {
             times: columns.times.get(begin..at).unwrap_or_default(),
             // Without times the age of a temperature is unknown.
@@ -184,6 +198,11 @@ mod tests {
         );
         assert_eq!(table.past(2).times, [1.0]);
         assert!(table.past(1).times.is_empty() && table.past(3).configurations.is_empty());
+        // A selection has few rows, but each keeps its whole past if asked.
+        let some = [2, 0];
+        let [few, with_past] = [table.select(&some), table.select_with_past(&some)];
+        assert!(few.past(0).times.is_empty() && with_past.len() == 2);
+        assert_eq!([with_past.past(0), with_past.past(1)], [table.past(2), past]);
         let in_order = table.select(&[1, 4, 0, 3, 2]);
         assert_eq!(in_order.time_going_back(), None);
         assert_eq!(

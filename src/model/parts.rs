@@ -57,7 +57,8 @@ pub struct PartTerm {
 pub struct ModelParts {
     /// Arm with the values of its parameters.
     pub arm: Arm<f64>,
-    /// Terms of joints, beams, bases and instrument.
+    /// Terms value × regressor by which effects change quantities of joints, beams, bases and the
+    /// instrument.
     pub terms: Vec<PartTerm>,
     /// Relative scale error of the instrument.
     pub scale: f64,

@@ -20,7 +20,7 @@ pub struct Past<V = Vec<f64>> {
 
 impl Past<&[f64]> {
     /// Returns a copy that owns its numbers.
-    pub(super) fn to_owned(self) -> Past {
+    pub(crate) fn to_owned(self) -> Past {
         Past {
             times: self.times.to_vec(),
             temperatures: self.temperatures.to_vec(),

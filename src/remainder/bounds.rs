@@ -20,6 +20,9 @@ pub struct Bounds {
     pub poses: Vec<CorrectedPose>,
     /// Upper bound of the error length in each pose \[m\].
     lengths: Vec<f64>,
+    /// Ratio of the root mean square of left-out errors to their predicted lengths; 1 if no
+    /// configuration was left out.
+    scale: f64,
     /// Number of configurations whose left-out errors determine the bounds.
     learned_from: usize,
 }
@@ -87,7 +90,8 @@ impl Bounds {
         let scores = &correction.scores;
         let factor = scores.quantile(level);
         let lengths = poses.iter().map(|pose| factor * pose.size).collect();
-        Self { level, poses, lengths, learned_from: scores.configurations }
+        let scale = scores.scale().unwrap_or(1.0);
+        Self { level, poses, lengths, scale, learned_from: scores.configurations }
     }
 
     /// Returns the bounds for the case that, with the probability `share`, each pose errs by
@@ -145,6 +149,12 @@ impl Bounds {
         self.lengths[pose]
     }
 
+    /// Returns the expected root mean square of a pose's error length \[m\]: the predicted one, scaled
+    /// by the errors of left-out configurations, as bounds are.
+    pub(crate) fn expected_at(&self, pose: usize) -> f64 {
+        self.scale * self.poses[pose].size
+    }
+
     /// Returns the mean of the error bounds over the poses \[m\]; NaN if there are none.
     pub fn mean(&self) -> f64 {
         let bounds = (0..self.poses.len()).map(|pose| self.bound(pose));
@@ -153,7 +163,7 @@ impl Bounds {
 
     /// Returns the expected root mean square of the error length over all poses \[m\].
     pub fn expected(&self) -> f64 {
-        let squares = self.poses.iter().map(|pose| pose.size * pose.size);
+        let squares = (0..self.poses.len()).map(|pose| self.expected_at(pose).powi(2));
         (squares.sum::<f64>() / self.poses.len() as f64).sqrt()
     }
 
@@ -197,8 +207,13 @@ mod tests {
             is_extrapolated: false,
         };
         let bound = |share: f64, difference: f64| {
-            let bounds =
-                Bounds { level: 0.95, poses: vec![pose], lengths: vec![0.95e-3], learned_from: 60 };
+            let bounds = Bounds {
+                level: 0.95,
+                poses: vec![pose],
+                lengths: vec![0.95e-3],
+                scale: 1.0,
+                learned_from: 60,
+            };
             bounds.with_differences(quantile, share, &[difference]).bound(0)
         };
         for (share, difference) in

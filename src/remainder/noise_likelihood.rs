@@ -20,9 +20,10 @@ const MAX_STEPS: usize = 60;
 /// is diagonal, with the squared relative σ of the rows. Its inverse is C⁻¹ = σ⁻² (W − ρ w wᵀ),
 /// with W = D⁻¹, w = W 1 and ρ = σ_c² / (σ² + σ_c² Σ w).
 struct NoiseLikelihood {
-    /// Product (J S½, y)ᵀ W (J S½, y), with y the residuals at the prior's mean.
+    /// Product (J S½, y)ᵀ W (J S½, y), with S the prior covariance of the parameters, J their
+    /// Jacobian, and y the residuals at their mean given prior and information rows.
     gram: DMatrix<f64>,
-    /// Sum wᵀ (J S½, y); one row for each configuration and axis.
+    /// For each configuration and axis, a row: the sum wᵀ (J S½, y) over the rows of measurements.
     sums: DMatrix<f64>,
     /// Sum Σ w for each row of `sums`.
     weights: Vec<f64>,

@@ -33,8 +33,14 @@ pub fn check(problem: &Problem, check: &Check) -> Story {
     }
     let sheet = rows_of_sheet(problem);
     notes.extend(sheet.as_deref());
-    let counts =
-        format!("{}, {}", counted(names.len(), "parameter"), counted(forecast.poses, "pose"));
+    let noun = check.row_noun;
+    let of_poses = if noun == "pose" {
+        String::new()
+    } else {
+        format!(" in {}", counted(check.distinct_poses, "pose"))
+    };
+    let checked = counted(forecast.poses, noun);
+    let counts = format!("{}, {checked}{of_poses}", counted(names.len(), "parameter"));
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.extend([
         Block::lines(recommendation(problem, check)),
@@ -47,7 +53,7 @@ pub fn check(problem: &Problem, check: &Check) -> Story {
         )]),
         unidentifiable(&forecast.identifiability, &names, ("check.json", check.open_scale.as_deref())),
         Block::lines(
-            "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of predictions):",
+            format!("With more or fewer such {noun}s (rank; parameters of the arm identified to 90 % or more; error of predictions):"),
         ),
         Block::Table(growth_table(check)),
         Block::figures([growth_figure(check)]),
@@ -69,12 +75,19 @@ fn growth_figure(check: &Check) -> Option<Drawing> {
         let name = format!("noise of one measured position, rms {} mm", mm(noise, 3));
         (name, noise * 1e3)
     });
+    let (rows, title) = if check.row_noun == "point" {
+        ("points", "Expected error of predictions against the number of points")
+    } else {
+        ("poses", "Expected error of predictions against the number of poses")
+    };
     Series {
-        names: ("check-growth", "Expected error of predictions against the number of poses"),
-        caption: "Expected error of predicted positions after so many poses of this kind, without \
-                  measurement noise, on a logarithmic scale."
-            .to_owned(),
-        labels: ("poses", "error [mm]"),
+        names: ("check-growth", title),
+        caption: format!(
+            "Expected error of predicted positions after so many {}s of this kind, without \
+             measurement noise, on a logarithmic scale.",
+            check.row_noun
+        ),
+        labels: (rows, "error [mm]"),
         is_logarithmic: true,
         curves: vec![
             curve("95 % stay below", ACCENT, |error| error.quantile_95),
@@ -148,7 +161,7 @@ fn prediction_sentences(check: &Check) -> String {
             rows_of_kind(check.noise_of),
             mm(noise, 3)
         ),
-        None => "Tilts measure no length to compare that with.".to_owned(),
+        None => "No position is measured to compare that with.".to_owned(),
     };
     let [median, most, rms] = [median, quantile_95, rms].map(|length| mm(length, 3));
     format!(
@@ -175,7 +188,7 @@ fn growth_table(check: &Check) -> Table {
     Table::of(
         &check.growth.steps,
         &[
-            count("poses", |step| step.poses),
+            count(if check.row_noun == "point" { "points" } else { "poses" }, |step| step.poses),
             count("rank", |step| step.rank),
             count("≥ 90 %", |step| step.well_identified),
             length("median, mm", |error| error.median),

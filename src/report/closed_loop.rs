@@ -7,7 +7,7 @@ use super::errors::{
     DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM, both_parts, error_label, held_out_rows, rows_of,
     test_rows_word, unpredicted, with_unit,
 };
-use super::found_effects::{found_effects, found_heading, rounds, status_table};
+use super::found_effects::{UNCOMPARED, found_effects, found_heading, rounds, status_table};
 use super::identify::{
     fit_warnings, identifiability_with_figures, mean_error, parameters_fact, rms_and_largest,
     row_counts_fact, why_not_trusted,
@@ -19,8 +19,8 @@ use super::render::{Report, report, text};
 use super::residual_tests::{self, other_reduced_chi2};
 use super::unexplained::{structure_places, structure_sentences, to_declare};
 use super::verdict::{
-    alternative, causes, effect_counts, has_place, is_less_probable, stand_in_sentence, title,
-    unknown_part, verdict,
+    alternative, causes, doubts, effect_counts, has_place, is_less_probable, stand_in_sentence,
+    title, verdict,
 };
 use super::{effect, figures, trace};
 use crate::fit::ErrorSummary;
@@ -102,7 +102,7 @@ fn cause(found: &FoundEffect, max_values: usize) -> Point {
         Some(claims) => {
             format!("law: {} among those tried", percent(claims.law.probability))
         }
-        None => "probability of the law not determined".to_owned(),
+        None => UNCOMPARED.to_owned(),
     };
     facts.extend((stand_in.is_none() && found.status == Status::Found).then_some(law));
     let label = if !has_place(found) {
@@ -145,11 +145,11 @@ fn head<'a>(
     blocks
 }
 
-/// States that a remainder corrects what is left unexplained; `None` without one.
+/// States the held-out error with and without a remainder that is kept; `None` without one.
 fn corrected_sentence(closure: &ClosedLoop, accuracy: &PredictionAccuracy) -> Option<String> {
     let (before, after) = (&closure.after.fitted.held_out, accuracy.corrected.as_ref()?);
     Some(format!(
-        "A remainder corrects what is left: with it the mean held-out error is {} instead of {}.",
+        "A remainder is kept: with it the mean held-out error is {} instead of {}.",
         with_unit(after, after.mean.norm),
         with_unit(before, before.mean.norm)
     ))
@@ -218,7 +218,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
 /// Returns the report of the command `loop`.
 pub fn loop_report(problem: &Problem, closure: &ClosedLoop, plots: &PlotData) -> Report {
     let result = LoopResult::new(problem, closure);
-    report(problem, "closed loop", &blocks(problem, closure, &result, plots))
+    report(problem, "search for missing effects", &blocks(problem, closure, &result, plots))
 }
 
 fn blocks<'a>(
@@ -238,7 +238,7 @@ fn blocks<'a>(
     let added = after.unknowns.len().saturating_sub(fit.unknowns.len());
     let unknowns = if added > 0 {
         format!(
-            "{} ({} as declared, {added} of what was found)",
+            "{} ({} as declared, {added} of what was added)",
             counted(after.unknowns.len(), "parameter"),
             fit.unknowns.len()
         )
@@ -271,7 +271,7 @@ fn blocks<'a>(
         Block::Page(found_effects(result, 2 * MAX_SHOWN_ALTERNATIVES)),
         Block::figures(plots.causes.iter().zip(1..).map(|(cause, k)| {
             let found = cause.found.and_then(|index| result.effects.get(index));
-            Some(figures::effect(cause, k, &plots.shown, found.and_then(unknown_part)))
+            Some(figures::effect(cause, k, &plots.shown, doubts(found)))
         })),
     ]);
     blocks.extend(status_table(closure, result));
@@ -439,13 +439,13 @@ fn gain_sentences(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool)
         let [gain, size, low, high] = [mean, mean.abs(), low, high].map(|value| number(value, 4));
         if includes_zero {
             return format!(
-                "With what was found the mean error of the {} does not change measurably (gain \
+                "With what was added the mean error of the {} does not change measurably (gain \
                  {gain} {unit}, {low} to {high} {unit}, 95 %).",
                 held_out_rows(after)
             );
         }
         format!(
-            "With what was found the mean error of the {} {falls} by {size} {unit} ({low} to {high} \
+            "With what was added the mean error of the {} {falls} by {size} {unit} ({low} to {high} \
              {unit}, 95 %).",
             held_out_rows(after)
         )
@@ -494,7 +494,7 @@ fn gain_block(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) -> 
         ("the nominal arm", &before.fit.registered),
         ("the arm as declared, fitted", &before.fit.fitted),
     ];
-    arms.extend((!result.effects.is_empty()).then_some(("what was found", &after.fitted)));
+    arms.extend((!result.effects.is_empty()).then_some(("what was added", &after.fitted)));
     let words = gain_sentences(closure, result, is_corrected).into_iter().chain(unpredicted(&arms));
     Block::Text(words.collect::<Vec<_>>().join(" "))
 }

@@ -62,8 +62,9 @@ fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
         (Status::Located, None) => "; not significant by itself",
         _ => "; that this is the law is not sure",
     };
+    let added = if found.status == Status::Found { "Found" } else { "Added" };
     let first = format!(
-        "Found by flexcal loop: {}, p-value {}{doubt}.",
+        "{added} by flexcal loop: {}, p-value {}{doubt}.",
         closure.before.describe(&found.effect),
         p_value(found.p_value)
     );

@@ -117,13 +117,13 @@ pub(crate) fn difference(sides: &[Side; 2]) -> Story {
             a.problem_name(),
             b.problem_name()
         )));
-    } else {
-        blocks.extend(notes([a, b], shared).into_iter().map(Block::Note));
-        blocks.extend(declaration_note(a, b).map(Block::Note));
-        let joint = joint_test([a, b]);
-        blocks.push(Block::Text(verdict(&differences, (tested, limit), joint, shared)));
-        blocks.extend(held_out_sentence(sides).map(Block::Text));
+        return Story::new(a.problem_name(), "two results", blocks);
     }
+    blocks.extend(notes([a, b], shared).into_iter().map(Block::Note));
+    blocks.extend(declaration_note(a, b).map(Block::Note));
+    let joint = joint_test([a, b]);
+    blocks.push(Block::Text(verdict(&differences, (tested, limit), joint, shared)));
+    blocks.extend(held_out_sentence(sides).map(Block::Text));
     let error = |side: &Side, name: &str| {
         let found = side.errors.iter().find(|error| error.0 == name);
         or_dash(found, |error| number(error.1, 4))
@@ -313,9 +313,10 @@ fn verdict(
 }
 
 /// Returns true if the second result predicts the common held-out rows significantly better than
-/// the first.
-pub fn predicts_better(sides: &[Side; 2]) -> bool {
-    paired_change(sides).is_some_and(|(_, change)| change.high < 0.0)
+/// the first; `None` if the results are of two arms.
+pub fn predicts_better(sides: &[Side; 2]) -> Option<bool> {
+    (!are_two_arms(&sides[0].estimate, &sides[1].estimate))
+        .then(|| paired_change(sides).is_some_and(|(_, change)| change.high < 0.0))
 }
 
 /// Returns the number of held-out rows that both results predict, and the mean of error B − A

@@ -57,15 +57,28 @@ pub(super) fn without_effect(value: &str, effect: &Effect) -> String {
     value.replacen(name, parameter, 1)
 }
 
-/// Explains moments and sides of approach in the formulas of a law; `None` if it has none.
+/// Explains the letters in the formulas of a law that need it; `None` if it has none.
 pub(super) fn legend(effect: &Effect) -> Option<String> {
     let Effect::Law(law) = effect else { return None };
-    let formulas = law.formulas().join(" ");
+    let constants =
+        (!law.parameters().is_empty()).then_some("constants in SI units (angles in rad)");
+    let letters = legend_of(&law.formulas().join(" "));
+    let parts: Vec<String> = letters.into_iter().chain(constants.map(str::to_owned)).collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
+}
+
+/// Explains moments, sides of approach, time and warming in `formulas`; `None` if it has none.
+pub(super) fn legend_of(formulas: &str) -> Option<String> {
     let words = formulas.split(|c: char| !c.is_ascii_alphanumeric());
     let mut explained: Vec<String> = words
         .filter_map(|word| {
             if let Some(joint) = word.strip_prefix("approach") {
                 return Some(format!("{word}: side from which joint {joint} came, −1 to 1"));
+            }
+            match word {
+                "t" => return Some("t: time since the first pose of the session [s]".to_owned()),
+                "T" => return Some("T: temperature above the reference [K]".to_owned()),
+                _ => {}
             }
             let joint: usize = word.strip_prefix('M')?.parse().ok()?;
             Some(format!("{word}: moment of the loads about the axis of joint {joint} [N·m]"))
@@ -243,14 +256,20 @@ fn ranges(numbers: &[u32]) -> String {
     numbers.chunk_by(|a, b| *b == a + 1).map(run).collect::<Vec<_>>().join(", ")
 }
 
+/// Smallest size of a number of a range that is shown without decimals.
+const MIN_ROUNDED: f64 = 100.0;
+
 /// Lists the ranges over the identification rows of the quantities in a law; `None` without
 /// quantities.
 pub(super) fn seen_ranges(ranges: &[(impl Display, (f64, f64))]) -> Option<String> {
+    let shown = |value: f64| number(value, if value.abs() < MIN_ROUNDED { 3 } else { 0 });
     let range = |(of, (low, high)): &(_, (f64, f64))| {
-        format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
+        format!("{of} from {} to {}", shown(*low), shown(*high))
     };
     let ranges: Vec<String> = ranges.iter().map(range).collect();
-    (!ranges.is_empty()).then(|| format!("{} (SI units, °C)", ranges.join(", ")))
+    let joined = ranges.join(", ");
+    let celsius = if joined.contains("temperature") { ", temperature in °C" } else { "" };
+    (!ranges.is_empty()).then(|| format!("{joined} (SI units{celsius})"))
 }
 
 #[cfg(test)]

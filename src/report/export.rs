@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Table};
 use super::render::text;
 use crate::fit::{ErrorSummary, Estimate, Identification, rows_of_kind};
-use crate::quantity::format::{mm, number};
+use crate::quantity::format::{counted, mm, number};
 use crate::results::{ExportResult, ExportedErrors, Origin, Summary};
 
 /// Ratio of the mean error of one geometry to that of another, above which the other one is clearly
@@ -145,6 +145,12 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
         let row = |origin: &Origin| {
             vec![origin.joint.clone(), number(origin.moved_mm, 4), number(origin.turned_deg, 5)]
         };
+        let changed =
+            origins.iter().filter(|of| of.moved_mm != 0.0 || of.turned_deg != 0.0).count();
+        blocks.push(Block::lines(format!(
+            "{changed} of {} change:",
+            counted(origins.len(), "joint origin")
+        )));
         let header = ["origin of", "moved, mm", "turned, °"];
         blocks.push(Block::Table(Table::new(&header, origins.iter().map(row).collect(), &[0])));
     }

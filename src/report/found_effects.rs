@@ -11,10 +11,22 @@ use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::{FoundEffect, LoopResult, Step, Witness};
 use crate::select::{ClosedLoop, Status};
 
+/// Statement on an effect whose law has no probability.
+pub(super) const UNCOMPARED: &str =
+    "judged by its p-value alone: its law was not compared with others";
+
 /// Returns the heading of the list of effects, which claims nothing after a fit that is not
 /// trusted.
 pub(super) fn found_heading(result: &LoopResult) -> &'static str {
-    if result.trusted { "What was found" } else { "What the search added, and does not claim" }
+    if !result.trusted {
+        "What the search added, and does not claim"
+    } else if result.with_status(Status::Found).next().is_some() {
+        "What was found"
+    } else if result.with_status(Status::Probable).next().is_some() {
+        "What probably acts"
+    } else {
+        "What may act: no effect is sure"
+    }
 }
 
 /// Lists the effects that the loop added, each with its status and at most `alternatives`
@@ -42,10 +54,14 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     let mut details: Vec<String> = stand_in_sentence(found).into_iter().collect();
     details.extend(effect::values(&found.effect.effect, &found.parameters));
     let is_open = found.claims.is_none() && !found.is_only_with_others();
-    let undetermined = || is_open.then(|| "probability of the law not determined".to_owned());
+    let undetermined = || is_open.then(|| UNCOMPARED.to_owned());
     details.extend(claims(found).or_else(undetermined));
     details.extend(effect::seen_ranges(&found.ranges).map(|seen| format!("seen for {seen}")));
-    details.extend(found.resembles.as_ref().map(|cause| format!("hint: {cause}")));
+    let hint = found.resembles.as_ref().map(|cause| {
+        let noun = cause.trim_start_matches("as ").trim_end_matches(" would");
+        format!("hint: {noun} would act alike")
+    });
+    details.extend(hint);
     details.extend(found.stability.map(|share| {
         format!(
             "found in {} % of refits on random 80 % subsets of the poses",

@@ -64,7 +64,7 @@ pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story
 fn error_paragraph(next: &NextPoses, percent: &str) -> String {
     match next.error {
         Some(error) => format!(
-            "In the workspace the identified arm errs by {} ± {} mm (expected rms, noise included), and by less than {} mm with a \
+            "In the workspace, measured errors are expected at {} ± {} mm (rms, noise included), and below {} mm with a \
              probability of {percent} %.{} {} a misfit of the model of {} mm per axis besides {} \
              mm of noise.",
             mm(error.expected, 3),

@@ -22,6 +22,8 @@ const MAX_EQUAL_VARIANCE_RATIO: f64 = 1.0 + 1e-9;
 /// Smallest ratio of the rms error of held-out rows to that of fitted rows which is said where no
 /// error bound says it.
 const UNCERTAIN_RATIO: f64 = 3.0;
+/// First word on a fit without errors that something contradicts beyond chance.
+const CONVERGED: &str = "Converged";
 /// Name of the file that contains all outliers and influential rows.
 const RESULT_FILE: &str = "estimate.json";
 
@@ -56,17 +58,16 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
                 .finding(FindingCode::RowsSetAside)
                 .and_then(|finding| Some((finding.value("rows")?.as_u64()?, finding.number("of")?)))
                 .map_or((0, 0.0), |(rows, of)| (rows, of));
-            let (what, left) = if aside > 0 {
-                let others =
-                    format!("the {:.0} rows that the robust loss counts", of - aside as f64);
-                (others, format!("; {aside} of {of:.0} rows are set aside"))
+            let explained = if aside > 0 {
+                let kept = of - aside as f64;
+                format!(
+                    "the {kept:.0} rows that the robust loss keeps scatter as the declared σ says; \
+                     {aside} of {of:.0} rows are set aside"
+                )
             } else {
-                ("the data".to_owned(), String::new())
+                "the model explains the data to the declared σ".to_owned()
             };
-            format!(
-                "Reduced χ² (χ²/ν) is {}: the model explains {what} to the declared σ{left}.",
-                number(chi2, 2)
-            )
+            format!("Reduced χ² (χ²/ν) is {}: {explained}.", number(chi2, 2))
         }
         ResidualSize::Unclear(chi2) => {
             let (size, what) =
@@ -151,6 +152,9 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
         _ if found.names_mistake() => {
             "as a consequence of the mistake that the warnings name".to_owned()
         }
+        _ if is_larger && found.has(FindingCode::PriorContradicted) => {
+            "because of the prior whose σ the data refute".to_owned()
+        }
         _ if !is_larger => "so the declared σ is too large".to_owned(),
         Some(influential) => {
             let cause = match influential.rows.len() {
@@ -161,12 +165,21 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
             let rows = counted(influential.rows.len(), row_noun(found));
             format!("mostly because of {rows} {cause}")
         }
+        None if rests_on_limits(found) => "so the declared σ is too small, a limit at which the \
+                                           fit rests is wrong, or the model lacks something"
+            .to_owned(),
         None => "so the declared σ is too small or the model lacks something".to_owned(),
     };
     format!(
         "The σ estimated from residuals and priors is {size} × the declared one{declared}, {cause}. Fit and standard errors assume \
          {assumed}."
     )
+}
+
+/// Returns true if a bound or a constraint holds a parameter of the fit.
+fn rests_on_limits(found: &Identification) -> bool {
+    !found.active_constraints.is_empty()
+        || found.estimates.iter().any(|estimate| estimate.at_bound.is_some())
 }
 
 /// Formats χ²/ν with two decimals, or with two significant digits if it is small.
@@ -298,7 +311,7 @@ pub(super) fn residual_fact(term: &'static str, found: &Identification) -> (&'st
     (term, size)
 }
 
-/// Returns what contradicts a trusted fit or its predictions, for its headline: held-out rows that
+/// Returns what contradicts a fit without errors or its predictions, for its headline: held-out rows that
 /// the fit made worse, new rows against the prior, other held-out rows, and changes between rows.
 pub(super) fn reservations(
     found: &Identification,
@@ -377,8 +390,8 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         format!(", but {}", reservations.join("; "))
     };
     if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
-        let judged = unjudged.unwrap_or_else(|| "The fit is to be trusted".to_owned());
-        return format!("{judged}{reserved}.");
+        let judged = if reserved.is_empty() { "The fit is to be trusted" } else { CONVERGED };
+        return format!("{}{reserved}.", unjudged.unwrap_or_else(|| judged.to_owned()));
     }
     let raised = assumed_sigma_ratio(found);
     let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
@@ -406,7 +419,10 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     } else {
         format!("rises from {from} to {to}")
     };
-    let judged = unjudged.unwrap_or_else(|| format!("Trusted{scope}"));
+    let judged = unjudged.unwrap_or_else(|| match reserved.as_str() {
+        "" => format!("Trusted{scope}"),
+        _ => CONVERGED.to_owned(),
+    });
     format!(
         "{judged}{reserved}: the mean {} error {change}{without}.{}",
         test_rows_word(&found.fitted).replace(' ', "-"),

@@ -93,8 +93,8 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
             let is_hidden = comparison.chi2.is_some_and(|(.., p)| p >= MIN_AGREEING_P);
             let but = if is_hidden { ", but the test for single causes finds one" } else { "" };
             format!(
-                "{but}. They disagree. Most probable of the causes that are tried: {}.",
-                causes.join("; ")
+                "{but}. They disagree. Most probable of the changes that are tried: {}.",
+                causes.join(", together with ")
             )
         }
     };

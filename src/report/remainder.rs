@@ -217,7 +217,16 @@ impl PredictionAccuracy {
         let errors = held_out.as_ref().unwrap_or(&found.fitted.held_out);
         if kept.is_empty() && found.has(FindingCode::HeldOutOutliers) {
             let [rms, max] = [errors.rms.norm, errors.max.norm].map(|of| number(of * 1e3, 2));
-            kept = format!(" But the held-out poses err by {rms} mm rms, {max} mm at most.");
+            kept = match &uncertainty.test {
+                Some(test) => format!(
+                    " {} of {} {HELD_OUT} exceed their own bound, where chance explains {}; the \
+                     largest held-out error is {max} mm.",
+                    test.beyond(),
+                    test.of,
+                    number(test.expected_beyond(), 1)
+                ),
+                None => format!(" The held-out poses err by {rms} mm rms, {max} mm at most."),
+            };
         }
         let contradicted = uncertainty.test.filter(BoundTest::is_contradicted);
         let bound = (mean.is_finite() && found.is_trusted()).then(|| {
@@ -298,7 +307,7 @@ pub(super) fn bound_sentence(
         let squares = poses.iter().map(|&pose| of(pose).powi(2));
         (squares.sum::<f64>() / poses.len() as f64).sqrt()
     };
-    let expected = |poses: &[usize]| rms(poses, &|pose| bounds.poses[pose].size);
+    let expected = |poses: &[usize]| rms(poses, &|pose| bounds.expected_at(pose));
     let shown = |length: f64| number(length * 1e3, 3);
     let bound = |poses: &[usize]| shown(rms(poses, &|pose| bounds.bound(pose)));
     let main = if within.is_empty() { &beyond } else { &within };
@@ -307,7 +316,7 @@ pub(super) fn bound_sentence(
         format!("Expected error {} mm rms, measurement noise included.", shown(expected(main)))
     } else {
         let uncorrected = rms(main, &|pose| {
-            bounds.poses[pose].size.hypot(misses.get(pose).copied().unwrap_or(0.0))
+            bounds.expected_at(pose).hypot(misses.get(pose).copied().unwrap_or(0.0))
         });
         let hardly = if expected(main) > MAX_CLEAR_RATIO * uncorrected {
             " The correction hardly changes it."
@@ -315,13 +324,13 @@ pub(super) fn bound_sentence(
             ""
         };
         format!(
-            "Expected error at the targets, measurement noise included: {} mm rms without \
-             correction, {} mm rms with it.{hardly}",
+            "Expected error at the targets, measurement noise included: {} mm rms with the commands \
+             of the table, {} mm rms with the corrected ones.{hardly}",
             shown(uncorrected),
             shown(expected(main))
         )
     };
-    let _ = write!(words, " The {level} % bound is {} mm rms.", bound(main));
+    let _ = write!(words, " The {level} % bounds: {} mm, rms over the poses.", bound(main));
     if let Some(compared) = compared
         && are_predicted(bounds, compared.errors)
     {

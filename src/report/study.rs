@@ -57,8 +57,8 @@ pub fn study(study: &Study, results: &Results) -> Story {
         ],
     );
     let table = table.noted(&[
-        "not trusted: share of fits that failed or are not to be trusted, of which errors, \
-         coverage and bias say nothing; held out: measured − predicted, noise included; covered: \
+        "not trusted: share of fits that failed or are not to be trusted; errors, coverage and bias \
+         leave them out; held out: measured − predicted, noise included; covered: \
          share of estimates within 1.96 standard errors of the truth, 95 % if the standard \
          errors are right;",
         "largest bias: largest ratio of bias to standard deviation of the errors, over all parameters, those that stay nominal included; ms: median time of a fit",

@@ -88,7 +88,8 @@ fn verdict(result: &TraceResult) -> String {
             .to_owned();
     }
     let structure = if result.size_alone().is_some() {
-        "The residual is larger than the declared σ explains, but no test shows on what it depends"
+        "The residual is larger than the declared σ explains, and no residual test by itself shows \
+         on what it depends"
             .to_owned()
     } else if result.structured {
         "The residual has structure".to_owned()
@@ -103,7 +104,12 @@ fn verdict(result: &TraceResult) -> String {
     let cause = match (groups.first(), result.significant()) {
         (Some(alike), _) if has_cause(alike) => {
             let probability = total_probability(alike);
-            format!("most probable cause: {} ({})", causes_of(alike, result), percent(probability))
+            let by = match result.size_alone() {
+                Some(_) => " by comparison of whole models",
+                None => "",
+            };
+            let causes = causes_of(alike, result);
+            format!("most probable cause{by}: {causes} ({})", percent(probability))
         }
         (None, Some(candidate)) => format!("it points to: {}", candidate.effect.description),
         (Some(_), Some(candidate)) => format!(
@@ -201,7 +207,9 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     if shown.is_empty() {
         return Vec::new();
     }
+    let legend = effect::legend_of(&shown.join(" "));
     let mut blocks = vec![Block::heading("Most probable explanations"), Block::list(shown)];
+    blocks.extend(legend.map(Block::Text));
     // The claims are those of the most probable single set.
     let first = &result.explanations[0];
     if !result.claims.is_empty() && std::ptr::eq(groups[0][0], first) {
@@ -230,7 +238,7 @@ pub(super) fn claims_text(claims: &Claims) -> String {
     let Claims { place, depends_on, law, .. } = claims;
     let words = match &law.value {
         Some(name) if name == "law" => {
-            format!("a law of the terms above: {}", percent(law.probability))
+            format!("a law of these terms: {}", percent(law.probability))
         }
         Some(name) => format!("law {name}: {}", percent(law.probability)),
         None => "law not known".to_owned(),
@@ -238,7 +246,16 @@ pub(super) fn claims_text(claims: &Claims) -> String {
     let inputs = if depends_on.value.is_empty() {
         String::new()
     } else {
-        let inputs = depends_on.value.join(" and ");
+        let inputs = depends_on.value.iter().map(|name| match name.as_str() {
+            "load" => "the moments of the loads",
+            name => name,
+        });
+        let inputs: Vec<&str> = inputs.collect();
+        let inputs = match inputs.split_last() {
+            Some((last, [])) => (*last).to_owned(),
+            Some((last, others)) => format!("{} and {last}", others.join(", ")),
+            None => String::new(),
+        };
         format!("; depends on {inputs}: {}", percent(depends_on.probability))
     };
     format!("acts {}: {}{inputs}; {words}", at_place(&place.value), percent(place.probability))

@@ -110,7 +110,15 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool, reservations: &[Str
                     test.words
                 )
             } else {
-                " The residual looks like noise, but its cause is not sure.".to_owned()
+                match result.effects.len() {
+                    0 => " The residual looks like noise, but no cause is sure.".to_owned(),
+                    1 => " With it in the model the residual looks like noise, but which law acts \
+                          is not sure."
+                        .to_owned(),
+                    _ => " With them in the model the residual looks like noise, but which laws \
+                          act is not sure."
+                        .to_owned(),
+                }
             };
             format!("Unexplained: {}.{noise}", with_lower_initial(&found))
         }
@@ -313,11 +321,29 @@ pub(super) fn stand_in_sentence(found: &FoundEffect) -> Option<String> {
         .then(|| format!("the model represents it by: {}", declared(&found.effect)))
 }
 
+/// Returns what is not known about a cause that the model only represents by some effect, and how
+/// sure another effect is that was not found; see [`unknown_part`] and [`doubt`].
+pub(super) fn doubts(found: Option<&FoundEffect>) -> (Option<&'static str>, Option<String>) {
+    (found.and_then(unknown_part), found.and_then(doubt))
+}
+
 /// States what is not known about a cause that the model only represents by some effect: its law, or
 /// place and law. `None` if the effect is at least a candidate for the law.
-pub(super) fn unknown_part(found: &FoundEffect) -> Option<&'static str> {
+fn unknown_part(found: &FoundEffect) -> Option<&'static str> {
     stand_in_sentence(found)?;
     Some(if has_place(found) { "The law is not known" } else { "Neither place nor law is known" })
+}
+
+/// States how sure an effect is that was not found; `None` for one that was.
+fn doubt(found: &FoundEffect) -> Option<String> {
+    let law = found.claims.as_ref().map(|claims| percent(claims.law.probability));
+    let law = law.map_or_else(String::new, |law| format!(" ({law})"));
+    Some(match found.status {
+        Status::Found => return None,
+        Status::Probable => format!("Probable{law}, not sure"),
+        Status::Located => format!("A candidate{law}, not sure"),
+        Status::Contradicted => "Contradicted by data outside the fit".to_owned(),
+    })
 }
 
 /// Returns the text with its first letter in lower case.

@@ -54,8 +54,8 @@ pub(crate) fn watch(
         };
         let _ = write!(
             head,
-            "\nThis cause is not the whole: with it updated, left-out rows still err by {} rms, where noise, the known misfit and the \
-             uncertainty of the estimate give {}{hidden}",
+            "\nThis cause is not the whole change, or another one acts: with it updated, left-out rows still err by {} rms, where \
+             noise, the known misfit and the uncertainty of the estimate give {}{hidden}",
             in_unit(left),
             in_unit(watch.expected_error)
         );
@@ -75,9 +75,14 @@ pub(crate) fn watch(
     blocks.push(Block::figures([control_chart(watch, rows)]));
     if watch.is_changed() {
         let rows = watch.causes.iter().flat_map(|cause| lines(cause, &in_unit)).collect();
+        let left = format!(
+            "error left out: rms of the rows if only this is updated, each row predicted from the others; noise, the known misfit and \
+             the uncertainty of the estimate give {}",
+            in_unit(watch.expected_error)
+        );
         let notes = [
             "probability: among all causes that were tried, given that something changed",
-            "error left out: rms of the rows if only this is updated, each row predicted from the others",
+            left.as_str(),
             "more poses: number of further poses like these that would distinguish this cause from the next one; –: none would",
         ];
         blocks.push(Block::Table(Table::new(&HEADER, rows, &[0, 2]).noted(&notes)));
@@ -167,7 +172,8 @@ fn verdict(watch: &Watch) -> String {
             )
         } else {
             format!(
-                "No change shown: the evidence for one is {} to 1, and an alarm takes {alarm} to 1",
+                "No change shown: the evidence for one is {0} to 1, below the {alarm} to 1 of an alarm; \
+                 chance reaches {0} to 1 in at most one of {0} cases",
                 two_digits(evidence, 4)
             )
         };
@@ -185,6 +191,9 @@ fn verdict(watch: &Watch) -> String {
                 "Not judged: the rows agree with the estimate if they are read in another way, with {}",
                 cause.label
             );
+        }
+        (Some(cause), _) if watch.unexplained_error().is_some() => {
+            format!("most probable of what was tried, but not the whole: {}", cause.label)
         }
         (Some(cause), _) => cause.label.clone(),
         (None, Some(cause)) => format!("not certain what; first {}", cause.label),
@@ -240,9 +249,9 @@ fn change(kind: CauseKind, change: &Change, is_largest: bool) -> String {
     if !change.std_error.is_finite() {
         let ratio = two_digits(change.change, 2);
         return if is_largest {
-            format!("{name} {ratio} or more")
+            format!("noise {ratio} times the known σ, or more")
         } else {
-            format!("{name} about {ratio}")
+            format!("noise about {ratio} times the known σ")
         };
     }
     let digits = decimals(change.std_error * factor, MAX_DECIMALS);

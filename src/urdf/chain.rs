@@ -322,6 +322,10 @@ fn leaf(
     {
         return Ok((leaf, leaves.iter().skip(1).map(named).collect()));
     }
+    // A leaf that no joint moves, such as a second frame of the base, is no end of the arm.
+    if leaves.iter().filter(|(moving, _)| *moving > 0).count() > 1 {
+        leaves.retain(|(moving, _)| *moving > 0);
+    }
     // The last link above all leaves, where a tool or a gripper branches.
     let path = |link: usize| {
         let up = |at: &usize| {
@@ -333,7 +337,8 @@ fn leaf(
     let paths: Vec<Vec<usize>> = leaves.iter().map(|&(_, link)| path(link)).collect();
     let is_common = |link: &&usize| paths.iter().all(|path| path.contains(link));
     let fork = paths.first().and_then(|path| path.iter().find(is_common)).copied();
-    let fork = fork.filter(|&link| link != base).map(|link| robot.link_name(link));
+    let is_moved = |link: &usize| depth(*link).is_some_and(|moving| moving > 0);
+    let fork = fork.filter(is_moved).map(|link| robot.link_name(link));
     let (base, leaves) = (robot.link_name(base), leaves.iter().map(named).collect());
     Err(robot.error(UrdfErrorKind::Leaves { base, leaves, fork }))
 }

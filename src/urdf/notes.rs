@@ -53,8 +53,8 @@ fn chosen_tip(chain: &Chain) -> Option<String> {
 fn moving_end(chain: &Chain) -> Option<String> {
     let (joint, tip) = (chain.moving_end()?, chain.ends().1);
     Some(format!(
-        "{tip} hangs on the moving joint {joint}, so that an export into this URDF can hold no tilt behind it; a fixed joint \
-         behind it, with its link as --tip, could"
+        "no fixed joint follows the moving joint {joint}, so that this URDF has no origin that could hold a rotation of the tool \
+         frame; add a fixed joint after {tip}, and choose its link with --tip"
     ))
 }
 

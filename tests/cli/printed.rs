@@ -229,3 +229,22 @@ fn applying_an_estimate_that_leaves_more_than_noise_is_followed_by_a_loop() {
     assert_contains(&after("c-link-thermal-bending"), &[words]);
     assert_contains(&after("a-none"), &["Next: flexcal compensate . --estimate"]);
 }
+
+/// What remembers the poses before depends on fitted and held-out ones alike, so that neither error
+/// bounds nor the watch may predict held-out poses by themselves.
+#[test]
+fn held_out_poses_of_an_arm_with_hysteresis_keep_their_past() {
+    let folder = Folder::new();
+    for name in ["problem.toml", "TRUTH.toml"] {
+        folder.copy(&format!("problems/scara/{name}"), name);
+    }
+    let hysteresis = "joint-hysteresis = { joint = 1, distance_rad = 1.0 }";
+    folder.map("problem.toml", |text| format!("{text}\n[[effect]]\n{hysteresis}\n"));
+    folder.edit("TRUTH.toml", "gear-ratio = { joint = 2 }", hysteresis);
+    folder.edit("TRUTH.toml", "error_relative = 0.001", "amplitude_deg = 0.1");
+    folder.simulate(".", "TRUTH.toml", 60, 1, "measurements.csv");
+    let said = folder.flexcal("identify . --out id").success().stdout;
+    assert!(said.contains("Trusted: ") && !said.contains("exceed their"), "{said}");
+    let watched = folder.flexcal("watch . --estimate id/estimate.json --out watched").success();
+    assert_contains(&watched.stdout, &["No change shown", "42 rows left out"]);
+}

@@ -292,5 +292,5 @@ fn joints_covariates_and_laws_print_as_they_are_read() {
     let json =
         r#"{"effect":"law","name":"a","at":"joint2","terms":["q2*`tilt deg`"],"sigma_rad":0.1}"#;
     assert_eq!(serde_json::to_string(&law).unwrap(), json);
-    assert_eq!(law.describe(), "the law “a” changes joint 2 by a multiple of q2*`tilt deg`");
+    assert_eq!(law.describe(), "joint 2 errs by a multiple of q2*`tilt deg` (law “a”)");
 }

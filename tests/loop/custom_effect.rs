@@ -93,7 +93,7 @@ fn trace_and_loop_find_it() {
         "{:?}",
         closure.effects
     );
-    let words = "the law “creep3” changes joint 3 by multiples of t/1000 and spline(payload/0.5)";
+    let words = "joint 3 errs by multiples of t/1000 and spline(payload/0.5) (law “creep3”)";
     assert_eq!(closure.before.describe(&creep(&problem, 3)), words);
     // The extended problem declares it.
     let text = std::fs::read_to_string(crate::common::arms::golden("problem.toml")).unwrap();

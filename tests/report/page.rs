@@ -146,7 +146,7 @@ fn a_closed_loop_shows_what_it_found() {
     let off: f64 = cause.points.iter().map(|point| (point.y - slope * point.x).powi(2)).sum();
     assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
     // The headline shows all stages.
-    let states = ["nominal arm", "as declared, fitted", "with what was found"];
+    let states = ["nominal arm", "as declared, fitted", "with what was added"];
     assert!(states.iter().all(|state| page.html.contains(&format!("class=\"label\">{state}<"))));
     // Each effect contributes millimetres over the workspace.
     let drift = shown

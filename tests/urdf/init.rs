@@ -240,7 +240,10 @@ fn other_units_and_broken_followers_are_noted() {
         describe(&Chain::new(&robot, None, Some("c")).unwrap()).unwrap().notes.join("\n")
     };
     let usual = notes("xyz=\"0.2 0 0\" rpy=\"3.1 0 0.2\"", "");
-    assert!(usual.starts_with("c hangs on the moving joint j2") && usual.lines().count() == 1);
+    assert!(
+        usual.starts_with("no fixed joint follows the moving joint j2")
+            && usual.lines().count() == 1
+    );
     let said = notes("xyz=\"0.2 0 0\" rpy=\"90 0 0\"", "");
     assert!(said.contains("j2: rpy holds 90 rad") && said.contains("degrees"), "{said}");
     let said = notes("xyz=\"200 0 0\"", "");
@@ -354,22 +357,29 @@ fn the_tip_is_guessed_where_one_link_is_plainly_meant() {
             .collect();
         format!("<robot name=\"r\"><link name=\"l0\"/>{}{beside}</robot>", joints.concat())
     };
-    let side = |parent: &str| {
+    let leaf = |name: &str, parent: &str| {
         format!(
-            "<link name=\"side\"/><joint name=\"s\" type=\"fixed\"><parent link=\"{parent}\"/><child link=\"side\"/></joint>"
+            "<link name=\"{name}\"/><joint name=\"of_{name}\" type=\"fixed\"><parent link=\"{parent}\"/><child link=\"{name}\"/></joint>"
         )
     };
+    let side = |parent: &str| leaf("side", parent);
     let text = arm(&side("l1"));
     let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
     let notes = describe(&Chain::new(&robot, None, None).unwrap()).unwrap().notes.join("\n");
     assert!(notes.contains("tip l5 taken") && notes.contains("side (1 moving joint)"), "{notes}");
-    assert!(notes.contains("l5 hangs on the moving joint j5"), "{notes}");
+    assert!(notes.contains("no fixed joint follows the moving joint j5"), "{notes}");
     let fixed = describe(&Chain::new(&robot, None, Some("side")).unwrap()).unwrap().notes.join("");
-    assert!(!fixed.contains("hangs"), "{fixed}");
+    assert!(!fixed.contains("no fixed joint"), "{fixed}");
     let error = Chain::new(&robot, None, Some("j5")).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("(that is a joint; its link is l5)"), "{error}");
     let text = arm(&side("l4"));
     let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
     let error = Chain::new(&robot, None, None).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("l5 (5 moving joints), side (4 moving joints)"), "{error}");
+    // A second frame of the base is no end, and hides no link that carries both ends.
+    let text = arm(&[leaf("tool0", "l5"), leaf("ee", "l5"), leaf("base", "l0")].concat());
+    let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
+    let error = Chain::new(&robot, None, None).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("with --tip, or l5, which") && !error.contains("base ("), "{error}");
+    assert!(Chain::new(&robot, None, Some("l5")).is_ok());
 }

@@ -36,8 +36,8 @@ impl Check for BoundsAreSeen {
             let first = names[..names.len().min(MAX_NAMED_PARTNERS)].join(", ");
             let text = format!(
                 "{name} rests on its {side} bound; the data hardly determine more than one \
-                 combination of it with {first}{more}, whose standard errors include what {name} \
-                 may do within its bounds"
+                 combination of it with {first}{more}, and standard errors allow for all values of \
+                 {name} within its bounds"
             );
             let numbers = [json!(name), side.into(), (*deviation).into(), json!(names)];
             Finding::new(FindingCode::BoundInUnidentifiedDirection, numbers, text)

@@ -65,9 +65,10 @@ pub(in crate::fit) struct CheckedFit<'a> {
     /// 1 σ that the fit assumed for a coordinate of positions, or of the first kind of rows if none
     /// measures a position \[m\] or \[rad\].
     pub sigma_taken: f64,
-    /// Covariance of the unknowns of `whole`, shape = (unknowns, unknowns); 0 for held unknowns.
+    /// Covariance of all unknowns of the fit, shape = (unknowns, unknowns); 0 in rows and columns
+    /// of held unknowns.
     pub covariance: &'a DMatrix<f64>,
-    /// Statistics of the unknowns of `whole`.
+    /// Statistics of all unknowns of the fit.
     pub statistics: &'a Statistics,
     /// True if further fits may search for the cause of a misfit. Fits that are only compared with
     /// one another do without.

@@ -269,7 +269,7 @@ impl Finding {
 
     /// Returns the finding with its remedy replaced by one specific to this case.
     #[must_use]
-    pub(in crate::fit) fn with_remedy(self, remedy: String) -> Self {
+    pub(crate) fn with_remedy(self, remedy: String) -> Self {
         Self { remedy, ..self }
     }
 

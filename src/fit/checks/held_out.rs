@@ -277,14 +277,12 @@ fn finding_of(rows: &[Outlier], of: usize) -> Finding {
         let axis = if is_vector { " along an axis" } else { "" };
         format!("{} (off by {}{axis})", row.location, format_error(row.kind, row.error.amax(), 3))
     };
-    let are_positions = rows.iter().all(|row| row.kind == "position");
-    let noun = if are_positions { "poses" } else { "rows" };
     let named: Vec<String> = rows.iter().take(MAX_NAMED_ROWS).map(name).collect();
     let more = rows.len().saturating_sub(MAX_NAMED_ROWS);
     let more = if more > 0 { format!(", and {more} more") } else { String::new() };
     let (count, verb) = (rows.len(), if rows.len() == 1 { "is" } else { "are" });
     let text = format!(
-        "{count} of {of} held-out {noun} {verb} too far off to be noise: {}{more}",
+        "{count} of {of} held-out rows {verb} too far off to be noise: {}{more}",
         named.join(", ")
     );
     Finding::new(FindingCode::HeldOutOutliers, [outliers_as_json(rows), of.into()], text)

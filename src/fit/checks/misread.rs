@@ -117,7 +117,10 @@ impl Check for ReadAsMeant {
                      priors"
                 )
             } else {
-                format!("{rest}; as read it is {as_read} (the less of nominal and fitted arm)")
+                format!(
+                    "{rest}; as read it is {as_read} (the smaller error of nominal \
+                     and fitted arm)"
+                )
             };
             let text = format!(
                 "the measurements fit if they are read in another way: with {named}{more}, the rms \

@@ -100,6 +100,10 @@ const CAUSES: [FindingCode; 5] = [
     FindingCode::CommandsRounded,
 ];
 
+/// Largest ratio of the rms error without limits to that with another reading of the input, at
+/// which both explain the misfit alike.
+const MAX_EQUAL_ERRORS: f64 = 1.05;
+
 /// Codes of findings on mistakes of which a change from a row on is only a consequence.
 const OF_TABLE: [FindingCode; 4] = [
     FindingCode::Misread,
@@ -143,6 +147,7 @@ const BEYOND_NOISE: [FindingCode; 2] =
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     let mut findings: Vec<Finding> = CHECKS.iter().flat_map(|check| check.check(fit)).collect();
+    state_limits_first(&mut findings);
     // A mistake in the whole table or in some rows may look like a change from a row on.
     let is_of_table = |found: &Finding| OF_TABLE.contains(&found.code);
     if findings.iter().any(is_of_table) {
@@ -217,6 +222,29 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     }
     state_held_out_remedies(&mut findings);
     findings
+}
+
+/// Names the limits of the problem before another reading of the input, if the fit without them
+/// leaves as little of the error: the reading may then be only another way to get around them.
+fn state_limits_first(findings: &mut [Finding]) {
+    let of = |code: FindingCode| findings.iter().position(|found| found.code == code);
+    let places = of(FindingCode::LimitContradicted).zip(of(FindingCode::Misread));
+    let Some((limits, misread)) = places else { return };
+    let [without_limits, corrected] =
+        [limits, misread].map(|place| findings[place].number("after").unwrap_or(f64::NAN));
+    let text = &findings[limits].text;
+    let Some((_, errors)) = text.split_once("; without limits ") else { return };
+    if without_limits <= MAX_EQUAL_ERRORS * corrected {
+        let text = format!(
+            "limits of the problem cause most of the misfit (another warning names them): without \
+             limits {errors}; or {}",
+            findings[misread].text
+        );
+        let remedy = "check these limits first, then units, signs, order or convention in the \
+                      table or the problem";
+        let stated = Finding { text, ..findings[misread].clone() };
+        findings[misread] = stated.with_remedy(remedy.to_owned());
+    }
 }
 
 /// Extends the remedy of a misfit by the readings of the input that would explain most of the

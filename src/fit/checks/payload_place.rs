@@ -47,8 +47,8 @@ pub(in crate::fit) fn payload_finding(
     let is_better = fit_following.termination.converged() && before - after > MIN_FALL_OF_DEVIANCE;
     is_better.then(|| {
         let text = format!(
-            "the payload hangs at the target as fitted, not as declared: χ² with the priors falls \
-             from {before:.1} to {after:.1}"
+            "the measurements fit better if the payload hangs at the fitted target instead of the \
+             nominal one: χ² with the priors falls from {before:.1} to {after:.1}"
         );
         Finding::new(FindingCode::PayloadAtTarget, [before.into(), after.into()], text)
     })

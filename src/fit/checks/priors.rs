@@ -62,7 +62,7 @@ impl Check for PriorsHold {
             let text = format!(
                 "the data refute the σ of \"{rule}\" in [parameters]: a σ about {factor:.0} \
                  times as large would lower the \
-                 residual to {:.1} %",
+                 residual to {:.1} % of what it is",
                 100.0 * sigma_ratio
             );
             let numbers = [json!(rule), (*factor).into(), (*sigma_ratio).into()];

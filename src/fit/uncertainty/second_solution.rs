@@ -88,7 +88,7 @@ pub(in crate::fit) struct Distance {
 type Fitted = (FitEnd, Statistics, Noise);
 
 /// Takes the best optimum that is found from `first`, and the second best if the measurements do
-/// not exclude it. The flags are those of [`fitted`].
+/// not exclude it. `flags`: whether a σ is declared, and whether the poses suffice to contradict it.
 pub(in crate::fit) fn best_of_two(
     fitting: &mut Fitting,
     first: Fitted,

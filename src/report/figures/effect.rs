@@ -17,14 +17,22 @@ fn law_at(curve: &[(f64, f64)], x: f64) -> f64 {
     }
 }
 
-/// Draws the figure of the effect that the loop found as number `number` (from 1). `shown` are the
+/// Draws the figure of the effect that the loop added as number `number` (from 1). `shown` are the
 /// rows that figures may draw, ascending. `unknown` states what is not known if the effect only
-/// represents structure of unknown law.
-pub fn effect(cause: &Cause, number: usize, shown: &[usize], unknown: Option<&str>) -> Drawing {
+/// represents structure of unknown law, and `doubt` how sure another effect is that was not found.
+pub fn effect(
+    cause: &Cause,
+    number: usize,
+    shown: &[usize],
+    (unknown, doubt): (Option<&str>, Option<String>),
+) -> Drawing {
     let name = format!("effect-{number}");
     let Some(unknown) = unknown else {
-        let lead = "Found by the loop; the line is the fitted law.";
-        return draw(cause, shown, (&name, "fitted law", lead));
+        let (law, lead) = match doubt {
+            None => ("fitted law", "Found by the loop; the line is the fitted law.".to_owned()),
+            Some(doubt) => ("fit", format!("{doubt}; the line is the fit of this law.")),
+        };
+        return draw(cause, shown, (&name, law, &lead));
     };
     let lead = format!(
         "{unknown}: the model represents the structure by this effect, and the line is its fit."

@@ -29,8 +29,8 @@ const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
 
 /// Sentences at the end of a report that explain its errors.
 const ERRORS_NOTE: &str = " Errors are distances between measured and predicted positions. Nominal arm, or before: the arm without a fit, \
-                      except for its free base and tool parameters. Where \"before\" is another \
-                      arm, a note under the table says which. Held-out poses only \
+                      except for its free base and tool parameters, unless a note under the table \
+                      says otherwise. Held-out poses only \
                       judge: no parameter is fitted to them and no effect chosen by them.";
 
 /// Report in two formats, with its figures.

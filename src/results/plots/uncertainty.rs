@@ -120,7 +120,8 @@ impl Uncertainty {
     }
 }
 
-/// Compares the error bounds with the position errors of the held-out configurations.
+/// Compares the error bounds with the position errors of the held-out configurations; `None`
+/// without held-out positions.
 fn bound_test(
     (found, problem): (&Identification, &Problem),
     data: &Dataset,
@@ -132,7 +133,8 @@ fn bound_test(
     if held_out.is_empty() {
         return Ok(None);
     }
-    let rows = table.select(&held_out);
+    // Effects with memory depend on the poses before, whether these are held out or not.
+    let rows = table.select_with_past(&held_out);
     let (positions, corrected) = predict_identified(found, problem, fitted.correction(), &rows)?;
     let bounds = Bounds::new(fitted.correction(), corrected, BOUND_LEVEL);
     let errors = positions.iter().zip(&rows.positions).map(|(at, measured)| (measured - at).norm());

@@ -50,7 +50,7 @@ pub(crate) fn sessions(rows: &Measurements) -> Option<&Labels> {
     Some(&rows.session).filter(|session| session.names.iter().any(|name| !name.is_empty()))
 }
 
-/// Returns the label of a row, which counts from 0.
+/// Returns the word that `labels` gives the row with this index, such as its session.
 pub(crate) fn label(labels: &Labels, row: usize) -> String {
     labels.names[labels.of_row[row]].clone()
 }

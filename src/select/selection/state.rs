@@ -113,7 +113,8 @@ impl<'a> SearchState<'a> {
         self.added(fitted).into_iter().filter(|effect| !reconsidered.contains(effect)).collect()
     }
 
-    /// Evaluates the evidence about a fit; `None` if its residual is not finite.
+    /// Evaluates the evidence about a fit and keeps it in the state; `None` if its residual is not
+    /// finite. Added effects that are reconsidered are evaluated as if removed.
     ///
     /// # Errors
     /// Returns an error if the search was stopped.

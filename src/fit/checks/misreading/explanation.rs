@@ -43,8 +43,8 @@ impl LeftOutMisfit {
 pub(in crate::fit) struct Explanations {
     /// Misreadings with whose correction the registered nominal arm has a far smaller error.
     pub near: Vec<Misreading>,
-    /// Root mean squared error of the registered nominal arm with the best of `near` corrected
-    /// \[m\], \[rad\] or \[px\].
+    /// Root mean squared error of the registered nominal arm after correcting the misreading that
+    /// lowers it most, the first of `near` \[m\], \[rad\] or \[px\].
     pub near_error: f64,
     /// Misreadings with whose correction a full fit has a far smaller error.
     pub fitted: Vec<Explanation>,

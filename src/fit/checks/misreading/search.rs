@@ -232,8 +232,9 @@ impl<'a> Trial<'a> {
         errors.into_iter().flatten().collect()
     }
 
-    /// Fits the misreadings with the smallest `errors` in full. Returns those with an rms error far
-    /// below `as_read` \[m\], best first.
+    /// Fits the misreading with the smallest of `errors` of each group in full, at most
+    /// [`MAX_FITTED_MISREADINGS`]. Returns those with an rms error far below `as_read` \[m\], best
+    /// first.
     fn fit_in_full(&self, errors: &[(Misreading, f64)], as_read: f64) -> Vec<Explanation> {
         let mut groups = Vec::new();
         let mut is_first = |misreading: &Misreading| {
