@@ -15,8 +15,11 @@ pub(super) fn name_column(names: &[String]) -> Option<usize> {
     place("pose").or_else(|| place("name"))
 }
 
+/// Conversion of a number to its SI unit.
+type ToSi = fn(f64) -> f64;
+
 /// Units of columns with times, each with its conversion to seconds. Controllers log milliseconds.
-pub(super) const TIME_UNITS: [(&str, fn(f64) -> f64); 2] = [("s", |x| x), ("ms", |x| x / 1000.0)];
+pub(super) const TIME_UNITS: [(&str, ToSi); 2] = [("s", |x| x), ("ms", |x| x / 1000.0)];
 
 /// Returns the column with times: one with a unit, else `time`, whose cells must be dates.
 pub(super) fn time_key(names: &[String]) -> Option<Key> {

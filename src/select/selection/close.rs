@@ -118,6 +118,16 @@ pub fn close(
     close_by(problem, data, options, &SelectionRules::DEFAULT)
 }
 
+/// Returns true if no effect is searched: with a lens error, because it would be mistaken for an
+/// effect of the arm, and with errors as large as the spread of the measurements.
+fn no_effect_explains(declared: &Fitted) -> bool {
+    let misses = declared.found.finding(FindingCode::MissesMeasurements);
+    let number = |name: &str| misses.and_then(|misses| misses.number(name));
+    let is_hopeless = misses.is_some()
+        && number("rms").unwrap_or(f64::INFINITY) > number("spread").unwrap_or(0.0);
+    is_hopeless || declared.found.has(FindingCode::LensContradicted)
+}
+
 /// Runs the loop like [`close`], with other settings.
 ///
 /// # Errors
@@ -139,13 +149,7 @@ pub fn close_by(
     let declared = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&declared, &data);
     let mut state = SearchState::new(&stoppable, options, &declared);
-    // With a lens error no effect is searched, because it would be mistaken for one of the arm. None
-    // explains errors as large as the spread of the measurements.
-    let is_hopeless =
-        declared.found.finding(FindingCode::MissesMeasurements).is_some_and(|misses| {
-            misses.number("rms").unwrap_or(f64::INFINITY) > misses.number("spread").unwrap_or(0.0)
-        });
-    let result = if is_hopeless || declared.found.has(FindingCode::LensContradicted) {
+    let result = if no_effect_explains(&declared) {
         Ok((declared.clone(), None))
     } else {
         with_misread_effect(&mut state, &declared)
