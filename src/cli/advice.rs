@@ -99,9 +99,17 @@ pub fn after_fit(
             "correct the table or {file} as the warning says, then flexcal identify {named}"
         ),
         None if found.has(FindingCode::LensContradicted) => format!(
-            "free the intrinsics in [parameters] of {file} as the warning says, then flexcal \
-             identify {named}"
+            "correct or free the intrinsics in {file} as the warning says, then flexcal identify {named}"
         ),
+        None if found
+            .finding(FindingCode::HeldParameter)
+            .and_then(|held| held.word("parameter"))
+            .is_some_and(|name| name.contains('[')) =>
+        {
+            format!(
+                "correct or free in {file} what the warning names, then flexcal identify {named}"
+            )
+        }
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
