@@ -384,7 +384,13 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     } else {
         format!("rises from {from} to {to}")
     };
-    let judged = unjudged.unwrap_or_else(|| format!("Trusted{scope}"));
+    let judged = unjudged.unwrap_or_else(|| {
+        if found.unknowns.is_empty() {
+            "No parameter is free, so that the nominal arm is judged".to_owned()
+        } else {
+            format!("Trusted{scope}")
+        }
+    });
     format!(
         "{judged}{reserved}: the mean {} error {change}{without}.{}",
         test_rows_word(&found.fitted).replace(' ', "-"),
