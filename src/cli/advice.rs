@@ -99,9 +99,13 @@ pub fn after_fit(
             "correct the table or {file} as the warning says, then flexcal identify {named}"
         ),
         None if found.has(FindingCode::LensContradicted) => format!(
-            "free the intrinsics in [parameters] of {file} as the warning says, then flexcal \
-             identify {named}"
+            "correct or free the intrinsics in {file} as the warning says, then flexcal identify {named}"
         ),
+        None if holds_a_wrong_fixture(found) => {
+            format!(
+                "correct or free in {file} what the warning names, then flexcal identify {named}"
+            )
+        }
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
@@ -167,6 +171,12 @@ pub fn after_fit(
         }
         None => to_apply("corrects commands"),
     }
+}
+
+/// Returns true if a held number of a point, an anchor or a surface causes the misfit.
+fn holds_a_wrong_fixture(found: &Identification) -> bool {
+    let held = found.finding(FindingCode::HeldParameter);
+    held.and_then(|held| held.word("parameter")).is_some_and(|name| name.contains('['))
 }
 
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared

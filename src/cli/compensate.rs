@@ -180,6 +180,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             )
         } else if misplaced.is_some() {
             "correct the table of targets, or name its frame, as the warning says".to_owned()
+        } else if warnings.iter().any(|warning| warning.kind.doubts_table()) {
+            "correct the table as the warning says, then the same command".to_owned()
         } else if reached == 0 {
             "check the unit and the frame of the targets (--frame base takes them in the frame of the base) and the limits of the \
              joints"
@@ -203,5 +205,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !are_reached && common.quiet {
         diagnostic::warn("a target is not reached; without --quiet it is named");
     }
-    Ok(Outcome::from_trust(are_reached && trusted))
+    let is_refuted = warnings.iter().any(|warning| warning.kind.refutes_table());
+    Ok(Outcome::from_trust(are_reached && trusted && !is_refuted))
 }

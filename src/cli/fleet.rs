@@ -50,13 +50,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let page = Path::new(&name).with_extension("html").display().to_string();
     let results = Results::claim("fleet", folder, estimates.clone(), &[&name, &page], flags)?;
     let read = estimates.iter().map(|file| trust.read(file)).collect::<Result<Vec<_>, _>>()?;
-    for estimate in read.iter().filter(|estimate| !estimate.trusted) {
+    let (trusted, others): (Vec<_>, Vec<_>) =
+        read.into_iter().partition(|estimate| estimate.trusted);
+    for estimate in &others {
         let file = estimate.file.display();
         diagnostic::warn(&format!(
-            "{file}: its fit was not trusted; see its findings, or leave the arm out"
+            "{file}: its fit is not to be trusted, so that the arm is left out; see its findings"
         ));
     }
-    let fleet = life::fleet(&read)?;
+    let fleet = life::fleet(&trusted)?;
     let story = report::fleet(&fleet);
     results.write(&[(&name, &fleet.to_toml()), (&page, &story.page())])?;
     if *json {

@@ -208,7 +208,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
         let is_structured = shown.residual_tests.is_structured();
         let estimate = results.path("estimate.json");
-        let next = advice::after_fit(common, (&problem, &identification), is_structured, &estimate);
+        let mut warnings = data.measurements.warnings.iter();
+        let next = if warnings.any(|warning| warning.kind.refutes_table()) {
+            format!(
+                "correct the table as the warning says, then flexcal identify {}",
+                common.problem_arguments()
+            )
+        } else {
+            advice::after_fit(common, (&problem, &identification), is_structured, &estimate)
+        };
         let turns = Common::orientation_line(&problem, &data.measurements);
         format!("{told}{turns}{words}{sources}{}Next: {next}\n", results.written())
     })?;

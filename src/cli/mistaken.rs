@@ -8,7 +8,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use flexcal::report::shell_word;
 
 /// Words that are often given as options or values but are neither, with the tip for them.
-const MISTAKEN_WORDS: [(&[&str], &str); 17] = [
+const MISTAKEN_WORDS: [(&[&str], &str); 18] = [
     (
         &["--output", "--ouput", "--outdir", "--out-dir", "--output-dir", "-o"],
         "--out DIR names the folder of the results",
@@ -60,6 +60,11 @@ const MISTAKEN_WORDS: [(&[&str], &str); 17] = [
     (
         &["--sigma", "--position-sigma", "--position_sigma_mm"],
         "the problem says how accurate the instrument is: position_sigma_mm = 0.05 in [data]",
+    ),
+    (
+        &["--noise", "--position-noise", "--noise-mm"],
+        "the file of --truth says how large the noise of a simulation is: position_sigma_mm = 0.05 in \
+         [noise]",
     ),
     (
         &["urdf", "URDF"],
@@ -149,7 +154,9 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
                 let other = || other_command(word, first, cli);
                 let table = || table_without_option(word, first);
                 let spaced = || unquoted(word, words);
-                let found = negative_number(words).or_else(other).or_else(table).or_else(spaced);
+                let second = || second_problem(word, words);
+                let found = long_dash(word).or_else(|| negative_number(words));
+                let found = found.or_else(other).or_else(table).or_else(spaced).or_else(second);
                 found.filter(|_| is_unknown)
             })
         }
@@ -172,6 +179,22 @@ fn unquoted(word: &str, words: &[OsString]) -> Option<String> {
     let is_option = option.starts_with("--") && !option.contains('=') && !first.starts_with('-');
     (is_option && !word.starts_with('-'))
         .then(|| format!("a value with a space needs quotes: {option} \"{first} {word}\""))
+}
+
+/// Returns the tip for an option that begins with a dash of typeset text; `None` for other words.
+fn long_dash(word: &str) -> Option<String> {
+    let name = word.trim_start_matches(['–', '—', '−']);
+    let option = format!("--{name}");
+    (name.len() < word.len())
+        .then(|| format!("{word:?} begins with a dash of typeset text: write {option}"))
+}
+
+/// Returns the tip for a second problem; `None` if `word` is none, or if no problem precedes it.
+fn second_problem(word: &str, words: &[OsString]) -> Option<String> {
+    let is_problem = |word: &Path| word.is_dir() || word.extension().is_some_and(|of| of == "toml");
+    let first = words.get(2).filter(|first| is_problem(Path::new(first)))?;
+    let first = shell_word(Path::new(first));
+    is_problem(Path::new(word)).then(|| format!("a command takes one problem, here {first}"))
 }
 
 /// Returns the tip for a negative number after an option, which the parser takes for another

@@ -143,6 +143,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 if lost.len() == 1 { "1 row".to_owned() } else { format!("{} rows", lost.len()) },
                 rows.location(first)
             ),
+            _ if warnings.iter().any(|warning| warning.kind.doubts_table()) => {
+                "correct the table as the warning says, then the same command".to_owned()
+            }
             (Some(file), _) if fitted.is_empty() && test.is_some_and(|of| of.is_contradicted()) => format!(
                 "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than foreseen lie within their bounds",
                 common.problem_arguments(),
@@ -164,7 +167,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let folder = results.folder.display();
         format!("{text}\nWritten to {folder}: {}\nNext: {next}\n", names.join(", "))
     })?;
-    Ok(Outcome::from_trust(trusted && lost.is_empty()))
+    let is_refuted = warnings.iter().any(|warning| warning.kind.refutes_table());
+    Ok(Outcome::from_trust(trusted && lost.is_empty() && !is_refuted))
 }
 
 /// Returns a warning if all measured positions of one session are off by nearly the same vector.

@@ -168,5 +168,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(cause) = misread.filter(|_| !common.prints_text()) {
         diagnostic::warn(&format!("not judged: the table may be misread, {}", cause.label));
     }
-    Ok(if watch.is_changed() { Outcome::Changed } else { Outcome::Done })
+    Ok(if watch.is_changed() { Outcome::Changed } else { Outcome::from_trust(estimate.trusted) })
 }

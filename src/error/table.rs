@@ -183,6 +183,11 @@ pub enum TableErrorKind {
     )]
     LostTargets { rows: usize, others: Vec<String>, write: String },
     #[error(
+        "u and v are at most {largest} in all rows, as normalised image coordinates are: write pixels, \
+         u_px = cx + fx u and v_px = cy + fy v, with the distortion applied"
+    )]
+    NormalisedPixels { largest: String },
+    #[error(
         "qx, qy, qz, qw are not a rotation, because their squares do not add up to 1; check the \
          columns"
     )]

@@ -153,10 +153,11 @@ pub enum WarningKind {
     )]
     SessionsAlike { name: String, other: String, rows: usize },
     #[error(
-        "the time falls by {back} s here{} (two series?); rows are used in the order of their times",
-        additional_rows(*rows)
+        "the time falls by {back} s here{} ({}); rows are used in the order of their times",
+        additional_rows(*rows),
+        if *is_midnight { "through midnight? add 86400 s from this row on" } else { "two series?" }
     )]
-    TimeGoesBack { rows: usize, back: String },
+    TimeGoesBack { rows: usize, back: String, is_midnight: bool },
     #[error(
         "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}{}; used all the same", plural(*rows),
         other_unit.as_ref().map_or_else(String::new, |unit| format!(", {unit}"))
@@ -197,6 +198,12 @@ pub enum WarningKind {
          quantity"
     )]
     UnusualTemperature { value: String },
+    #[error(
+        "{value} in {rows} row{}{}, while all others are {} to {}: a logger writes such a number where it has no \
+         reading; leave these rows out, or write what was measured",
+        plural(*rows), listed(*rows, others), range[0], range[1]
+    )]
+    NoReading { value: String, rows: usize, others: Vec<String>, range: [String; 2] },
     #[error(
         "all positions are multiples of {step} mm; such rounding errs by {rounding} mm (1 σ), far \
          more than the declared σ of {sigma} mm: export them with more digits"
@@ -298,6 +305,21 @@ pub enum WarningKind {
     )]
     SessionPerRow { rows: usize },
     #[error(
+        "each of the {rows} rows has a target of its own, which is fitted by itself; a target is a point of \
+         the tool: leave the column out, or name it pose if it names the poses"
+    )]
+    TargetPerRow { rows: usize },
+    #[error(
+        "{value} °C in every row, so that declared effects of the temperature cannot be told from \
+         the zero positions and lengths of the arm: measure at other temperatures, or leave them out"
+    )]
+    ConstantTemperature { value: String },
+    #[error(
+        "[{}, {}] is far from the middle of image_px = [{}, {}], and near it if exchanged: write [{}, {}]",
+        centre[0], centre[1], image[0], image[1], centre[1], centre[0]
+    )]
+    CentreExchanged { centre: [String; 2], image: [String; 2] },
+    #[error(
         "the table has the columns reached and miss_mm of commands.csv, whose positions are \
          targets and not measurements; put what the instrument measured into x_mm, y_mm and z_mm, \
          and remove these two columns"
@@ -335,6 +357,28 @@ pub enum WarningKind {
          column holds newtons, write kilograms"
     )]
     PayloadInNewtons { newtons: String, kilograms: String },
+}
+
+impl WarningKind {
+    /// Returns true if a column of the table probably holds another unit, or no readings, so that
+    /// results from the table are wrong.
+    #[doc(hidden)]
+    pub const fn doubts_table(&self) -> bool {
+        matches!(
+            self,
+            Self::Kelvins { .. }
+                | Self::Fahrenheit { .. }
+                | Self::FewDegrees { .. }
+                | Self::ManyTurns { .. }
+                | Self::NoReading { .. }
+        )
+    }
+
+    /// Returns true if no arm can have been in the state that the table states.
+    #[doc(hidden)]
+    pub const fn refutes_table(&self) -> bool {
+        matches!(self, Self::Kelvins { .. } | Self::NoReading { .. })
+    }
 }
 
 fn declared_mass_hint(arm: Option<&str>) -> String {

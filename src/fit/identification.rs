@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::error::TableErrorKind;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::finding::{Finding, FindingCode};
+use crate::fit::checks::held_fixtures::held_fixture;
 use crate::fit::checks::lens::lens_finding;
 use crate::fit::checks::misreading::{Explanations, is_of_views, start_of_fit, with_readings};
 use crate::fit::checks::outliers::outliers;
@@ -125,7 +126,11 @@ pub fn identify_model(
     if !options.provisional && options.earlier.is_none() {
         let provisional = provisional_options(&found, options);
         let fit = |problem: &Problem| identify(problem, data, &provisional);
-        found.findings.extend(lens_finding(problem, data, &found, fit));
+        // Wrong intrinsics bend the arm, so that they are the reason of other findings.
+        let lens = lens_finding(problem, data, &found, fit);
+        found.findings.splice(0..0, lens);
+        let held = held_fixture(problem, measurements, &found, fit);
+        found.findings.extend(held);
         if options.influential_rows {
             found.findings.extend(payload_finding(problem, data, &found, fit));
         }

@@ -12,6 +12,14 @@ use crate::problem::{Joint, JointKind, Observation, Problem};
 /// the intrinsics of a camera are those of another resolution. Centres of lenses are nearer to
 /// those of images.
 const MIN_PIXEL_REACH: f64 = 1.2;
+/// Place of the focal length among the numbers of a camera.
+const FOCAL_X: usize = 6;
+/// Minimum number of rows of pixels from which normalised image coordinates are recognised.
+const MIN_NORMALISED_ROWS: usize = 8;
+/// Largest absolute normalised image coordinate of usual lenses.
+const MAX_NORMALISED: f64 = 3.0;
+/// Smallest focal length that is in pixels \[px\].
+const MIN_PIXEL_FOCAL: f64 = 30.0;
 /// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
 /// \[m\].
 const MIN_TURN: f64 = std::f64::consts::PI / 180.0;
@@ -46,6 +54,30 @@ impl Measurements {
         match at_rest(0).filter(|_| !self.is_empty()) {
             Some((camera, marker)) => {
                 Err(self.location(0).error(TableErrorKind::NothingMoves { camera, marker }))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that the pixels of a camera with a focal length in pixels are no normalised image
+    /// coordinates.
+    pub(super) fn require_pixels(&self, problem: &Problem) -> Result<(), InputError> {
+        let pixel = |row: usize| {
+            let Observation::Pixel(camera, ..) = self.observation(row) else { return None };
+            let focal =
+                problem.fixtures.get(camera as usize)?.known.get(FOCAL_X).copied().flatten();
+            let at = self.positions.get(row)?;
+            Some((row, at.x.abs().max(at.y.abs()), focal.unwrap_or(0.0)))
+        };
+        let pixels: Vec<(usize, f64, f64)> = (0..self.len()).filter_map(pixel).collect();
+        let largest = pixels.iter().map(|(_, reach, _)| *reach).fold(0.0, f64::max);
+        let is_normalised = pixels.len() >= MIN_NORMALISED_ROWS
+            && largest < MAX_NORMALISED
+            && pixels.iter().all(|(.., focal)| *focal > MIN_PIXEL_FOCAL);
+        match pixels.first().filter(|_| is_normalised) {
+            Some((row, ..)) => {
+                let largest = format!("{largest:.2}");
+                Err(self.location(*row).error(TableErrorKind::NormalisedPixels { largest }))
             }
             None => Ok(()),
         }

@@ -19,25 +19,36 @@ pub(super) enum Meaning {
     Unknown,
 }
 
+/// Names of columns that probably hold a quaternion beside joint angles with a unit.
+const QUATERNION: [&str; 4] = ["q1", "q2", "q3", "q4"];
+
 /// Assignment of the numbers in column names (`q2`) to joints.
 pub(super) struct Numbering {
     /// Index of the joint of each number; number 1 is element 0.
     joints: Vec<usize>,
+    /// Name of a column of angles such as `q1_deg`, if q1, q2, q3 and q4 without a unit stand beside
+    /// it: they are probably a quaternion.
+    beside_quaternion: Option<&'static str>,
 }
 
 impl Numbering {
     /// Chooses the numbering that fits the column names: numbers count all joints, or only the
     /// joints that take a command.
     pub fn detect<'a>(names: impl Iterator<Item = &'a str>, problem: &Problem) -> Self {
-        let numbers: Vec<usize> =
-            names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
+        let names: BTreeSet<&str> = names.collect();
+        let angle = ["q1_deg", "q1_rad"].into_iter().find(|angle| names.contains(angle));
+        let is_quaternion = QUATERNION.iter().all(|plain| names.contains(plain));
+        let beside_quaternion = angle.filter(|_| is_quaternion);
+        let numbers = names.iter().filter_map(|name| numbered(split_unit(name).0, "q"));
+        let numbers: Vec<usize> = numbers.collect();
         let by_joint = || (0..problem.joints.len()).collect::<Vec<_>>();
         let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.takes_command());
         let moving: Vec<usize> = moving.map(|(index, _)| index).collect();
         let by_number = moving.iter().all(|index| numbers.contains(&(index + 1)));
         let by_order = (1..=moving.len()).all(|number| numbers.contains(&number))
             && numbers.iter().all(|number| (1..=moving.len()).contains(number));
-        Self { joints: if !by_number && by_order { moving } else { by_joint() } }
+        let joints = if !by_number && by_order { moving } else { by_joint() };
+        Self { joints, beside_quaternion }
     }
 
     /// Returns the index of the joint with a number, from 1; `None` if there is none.
@@ -152,7 +163,16 @@ impl Numbering {
                 }
             },
             None if role == Role::Time => Ok(Meaning::Read(Role::Time, DATE_CONVERSION)),
-            None if strict => Err(InputErrorKind::NeedsUnit { noun: unit.noun(), write: write() }),
+            None if strict => {
+                let quaternion = self.beside_quaternion.filter(|_| QUATERNION.contains(&name));
+                let write = quaternion.map_or_else(write, |angle| {
+                    format!(
+                        "qx, qy, qz and qw in their order if q1 to q4 are a quaternion, as they \
+                         seem to be beside {angle}"
+                    )
+                });
+                Err(InputErrorKind::NeedsUnit { noun: unit.noun(), write })
+            }
             None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
         }
     }

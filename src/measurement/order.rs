@@ -7,6 +7,9 @@ use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{Past, PoseTable};
 
+/// Times by which the clock falls from a row to the next one behind midnight \[s\].
+const MIDNIGHT_STEPS: std::ops::RangeInclusive<f64> = 79_200.0..=86_400.0;
+
 /// Chronological order of a table's rows, computed at first use. A copy computes its order again,
 /// because its rows may change.
 #[derive(Debug, Default)]
@@ -106,7 +109,11 @@ impl Measurements {
             );
         }
         let &(row, by) = back.first()?;
-        let kind = WarningKind::TimeGoesBack { rows: back.len(), back: format!("{by:.3}") };
+        let kind = WarningKind::TimeGoesBack {
+            rows: back.len(),
+            back: format!("{by:.3}"),
+            is_midnight: MIDNIGHT_STEPS.contains(&by),
+        };
         Some(Warning { location: self.location(row), kind })
     }
 
@@ -185,7 +192,8 @@ mod tests {
         assert_eq!(table.clock(), Some((2.0, 5.0)));
         // Row 1 is earlier than row 0 in session a, row 3 earlier than row 2 in session b.
         let warning = table.time_going_back().unwrap();
-        assert_eq!(warning.kind, WarningKind::TimeGoesBack { rows: 2, back: "5.000".to_owned() });
+        let back = "5.000".to_owned();
+        assert_eq!(warning.kind, WarningKind::TimeGoesBack { rows: 2, back, is_midnight: false });
         assert_eq!(warning.location.line, Some(3));
         let past = table.past(0);
         assert_eq!(

@@ -31,7 +31,54 @@ const MIN_ROWS: usize = 10;
 /// Declared range of every revolute joint above which motions of a few degrees are suspect \[rad\].
 const MIN_WIDE_RANGE: f64 = 1.0;
 
+/// Sizes of numbers that loggers write where a sensor gives no reading.
+const PLACEHOLDERS: [f64; 13] = [
+    99.0, 99.9, 99.99, 273.15, 999.0, 999.9, 999.99, 9999.0, 9999.9, 32_767.0, 32_768.0, 65_535.0,
+    99_999.0,
+];
+/// Largest share of the rows that hold a placeholder.
+const MAX_PLACEHOLDER_SHARE: f64 = 0.3;
+/// Minimum number of rows beside those with a placeholder.
+const MIN_OTHER_ROWS: usize = 4;
+/// Smallest distance of a placeholder from all other numbers, as a multiple of their range: for one
+/// of [`PLACEHOLDERS`], for a repeated 0, and for another repeated number.
+const MIN_PLACEHOLDER_RANGES: [f64; 3] = [1.0, 0.5, 3.0];
+/// Maximum number of rows with a placeholder that a warning names after the first.
+const MAX_NAMED_ROWS: usize = 6;
+
 impl Measurements {
+    /// Returns a warning for each column of temperatures, payloads, hoist forces or covariates some
+    /// of whose numbers are probably no readings, located at the first of them.
+    pub(super) fn placeholders(&self, problem: &Problem) -> Vec<Warning> {
+        let columns = [
+            ("temperature_C", &self.temperature, true),
+            ("payload_kg", &self.payload, false),
+            ("hoist_N", &self.hoist, false),
+        ];
+        let columns = columns.into_iter().filter_map(|(name, values, may_repeat)| {
+            Some((name.to_owned(), values.clone()?, may_repeat))
+        });
+        let declared = problem.data.covariates.iter().enumerate().map(|(place, covariate)| {
+            let value = |row: usize| self.covariates_of(row).get(place).copied();
+            let values = (0..self.len()).filter_map(value).collect();
+            (covariate.name.clone(), values, true)
+        });
+        let warning = |(name, values, may_repeat): (String, Vec<f64>, bool)| {
+            let (rows, [least, most]) = placeholder_rows(&values, may_repeat)?;
+            let (&first, others) = rows.split_first()?;
+            let value = *values.get(first)?;
+            let others = others.iter().take(MAX_NAMED_ROWS);
+            let kind = WarningKind::NoReading {
+                value: format!("{value}"),
+                rows: rows.len(),
+                others: others.map(|&row| self.location(row).to_string()).collect(),
+                range: [least, most].map(|limit| format!("{limit}")),
+            };
+            Some(self.warning(first, name, kind))
+        };
+        columns.chain(declared).filter_map(warning).collect()
+    }
+
     /// Returns a warning, located at the lowest temperature, if all temperatures are room
     /// temperatures in degrees Fahrenheit, and the declared reference is a room temperature in °C.
     pub(super) fn fahrenheit(&self, problem: &Problem) -> Option<Warning> {
@@ -183,4 +230,36 @@ impl Measurements {
         (widest <= TAU && least.count() > 1)
             .then(|| self.warning(row, format!("joint {}", joint + 1), kind))
     }
+}
+
+/// Returns the rows whose number is probably a placeholder, and the range of all others; empty ranges
+/// and usual numbers are none. With `may_repeat`, a far number that repeats exactly among numbers
+/// that do not is one, too; without it, only one of [`PLACEHOLDERS`] is.
+fn placeholder_rows(values: &[f64], may_repeat: bool) -> Option<(Vec<usize>, [f64; 2])> {
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    [least, most].into_iter().find_map(|value| {
+        let is_value = |other: &f64| other.total_cmp(&value).is_eq();
+        let rows: Vec<usize> =
+            (0..values.len()).filter(|&row| values.get(row).is_some_and(is_value)).collect();
+        let mut others: Vec<f64> =
+            values.iter().copied().filter(|other| !is_value(other)).collect();
+        let count = others.len();
+        others.sort_by(f64::total_cmp);
+        let (&low, &high) = (others.first()?, others.last()?);
+        others.dedup();
+        let is_known = PLACEHOLDERS.iter().any(|known| known.total_cmp(&value.abs()).is_eq());
+        let repeats = may_repeat && rows.len() > 1 && 2 * others.len() > count;
+        let [known, zero, other] = MIN_PLACEHOLDER_RANGES;
+        let ranges = match value.abs().total_cmp(&0.0).is_eq() {
+            _ if is_known => known,
+            true => zero,
+            false => other,
+        };
+        let distance = (low - value).max(value - high);
+        let is_rare = count >= MIN_OTHER_ROWS
+            && rows.len() as f64 <= MAX_PLACEHOLDER_SHARE * values.len() as f64;
+        let is_far = distance > ranges * (high - low);
+        (is_rare && is_far && (is_known || repeats)).then_some((rows, [low, high]))
+    })
 }

@@ -305,11 +305,15 @@ impl<'a> Tables<'a> {
                     measurements.files.extend(log.files());
                 }
                 measurements.require_moving_views(problem)?;
+                measurements.require_pixels(problem)?;
                 observed::add_known_distances(&mut measurements, problem)?;
                 let commands = commands(&columns);
                 warnings.extend(measurements.many_turns(problem, &commands));
                 warnings.extend(measurements.kelvins());
-                warnings.extend(measurements.unusual_temperature());
+                let no_readings = measurements.placeholders(problem);
+                let unusual = measurements.unusual_temperature();
+                warnings.extend(unusual.filter(|_| no_readings.is_empty()));
+                warnings.extend(no_readings);
                 warnings.extend(measurements.fahrenheit(problem));
                 warnings.extend(measurements.far_reference(problem));
                 warnings.extend(measurements.approach_without_sign());
@@ -323,12 +327,14 @@ impl<'a> Tables<'a> {
                 warnings.extend(
                     measurements.session_per_row().or_else(|| measurements.sessions_alike()),
                 );
+                warnings.extend(measurements.target_per_row());
                 warnings.extend(measurements.beyond_limits(problem, &commands));
                 if measured {
                     let is_comma = problem.data.dialect.decimal_comma;
                     let zeros = if is_comma { "0;0;0" } else { "0,0,0" };
                     warnings.extend(measurements.lost_targets(zeros)?);
                     warnings.extend(measurements.same_pose_elsewhere());
+                    warnings.extend(measurements.constant_temperature(problem));
                     warnings.extend(measurements.rounded_positions(problem));
                     warnings.extend(measurements.unused_sigma(problem));
                 }

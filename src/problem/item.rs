@@ -269,7 +269,7 @@ impl<'a, 'i> Item<'a, 'i> {
 
     /// Returns a list of three numbers.
     pub fn vector(&self) -> Result<Vector3<f64>, InputError> {
-        let elements = self.list("a list of 3 numbers")?;
+        let elements = self.list("a list of 3 numbers, [x, y, z]")?;
         if elements.len() != 3 {
             let (found, has_close_commas) = (elements.len(), has_close_commas(&elements, 3));
             return Err(self.error(InputErrorKind::NotAVector { found, has_close_commas }));

@@ -24,6 +24,10 @@ const MAX_FIXTURE_LINKS: f64 = 20.0;
 const FOCAL_X: usize = 6;
 /// Index of the image centre along x in the numbers of a camera.
 const CENTRE_X: usize = 8;
+/// Smallest distance of the centre of a lens from the middle of its images, relative to their
+/// diagonal, at which its coordinates may be exchanged, and the largest one of usual lenses.
+const MIN_EXCHANGED_OFF: f64 = 0.15;
+const MAX_USUAL_OFF: f64 = 0.08;
 /// Smallest plausible focal length, relative to the width of the image: an angle of view of 157°.
 const MIN_FOCAL_LENGTH: f64 = 0.1;
 /// Smallest plausible size of a marker \[m\].
@@ -421,8 +425,9 @@ impl Problem {
             let location = fixture.location.of_key("focal_px");
             (focal < MIN_FOCAL_LENGTH * width).then_some(Warning { location, kind })
         });
+        let exchanged = self.fixtures.iter().find_map(Fixture::exchanged_centre);
         let far = far.into_iter().chain(long).filter(|_| links > 0.0);
-        far.chain(tiny).chain(short).collect()
+        far.chain(tiny).chain(short).chain(exchanged).collect()
     }
 
     /// Returns the length of all links together, with the travel of sliding joints \[m\].
@@ -435,5 +440,22 @@ impl Problem {
             joint.a.hypot(joint.d) + placed + travel
         };
         self.joints.iter().map(length).sum()
+    }
+}
+
+impl Fixture {
+    /// Returns a warning if the centre of the lens of a camera is far from the middle of its images,
+    /// and near it with its two coordinates exchanged.
+    fn exchanged_centre(&self) -> Option<Warning> {
+        let [width, height] = self.image?;
+        let &[Some(x), Some(y)] = self.known.get(CENTRE_X..CENTRE_X + 2)? else { return None };
+        let off = |x: f64, y: f64| (x - width / 2.0).hypot(y - height / 2.0) / width.hypot(height);
+        let centre = [x, y];
+        let kind = WarningKind::CentreExchanged {
+            centre: centre.map(|value| value.to_string()),
+            image: [width, height].map(|size| size.to_string()),
+        };
+        let is_exchanged = off(x, y) > MIN_EXCHANGED_OFF && off(y, x) < MAX_USUAL_OFF;
+        is_exchanged.then(|| Warning { location: self.location.of_key("centre_px"), kind })
     }
 }

@@ -249,7 +249,8 @@ impl<'a, 'i> Section<'a, 'i> {
 impl<'a, 'i> Item<'a, 'i> {
     /// Returns the value as a section; it must be a table.
     pub fn section(&self) -> Result<Section<'a, 'i>, InputError> {
-        let table = self.value.as_table().ok_or_else(|| self.wrong_type("a table"))?;
+        let table =
+            self.value.as_table().ok_or_else(|| self.wrong_type("a table, { key = value }"))?;
         Ok(self.section_of(table))
     }
 

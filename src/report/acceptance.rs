@@ -119,7 +119,7 @@ pub fn tolerance_text(test: &TestedTolerance) -> String {
         )
     } else if let Some(reason) = test.no_test {
         format!(
-            "Undecided: {reason}, so they do not test whether {share} of the poses err by no more than \
+            "Undecided: {reason}, so the held-out poses do not test whether {share} of the poses err by no more than \
              {tolerance}; {beyond}."
         )
     } else {

@@ -420,6 +420,9 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         format!("rises from {from} to {to}")
     };
     let judged = unjudged.unwrap_or_else(|| match reserved.as_str() {
+        _ if found.unknowns.is_empty() => {
+            "No parameter is free, so that the nominal arm is judged".to_owned()
+        }
         "" => format!("Trusted{scope}"),
         _ => CONVERGED.to_owned(),
     });

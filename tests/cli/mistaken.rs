@@ -93,3 +93,15 @@ fn a_pool_of_measured_poses_and_a_tolerance_in_metres_are_asked_about() {
     let run = folder.flexcal(&format!("export . --estimate est/estimate.json {both}")).code(2);
     assert_contains(&run.message(), &["write different geometries"]);
 }
+
+#[test]
+fn usual_mistakes_in_arguments_get_a_tip() {
+    let folder = Folder::with([("problem.toml", PROBLEM)]);
+    for (command, words) in [
+        ("simulate . --poses 5 --noise 0.05", "the file of --truth says how large the noise"),
+        ("identify . —data rows.csv", "write --data"),
+        ("identify . .", "a command takes one problem, here ."),
+    ] {
+        assert_contains(&folder.flexcal(command).code(2).message(), &[words]);
+    }
+}

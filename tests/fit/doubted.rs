@@ -26,6 +26,22 @@ fn doubted(found: &Identification) -> Option<(usize, String)> {
 }
 
 #[test]
+fn a_coordinate_that_stands_still_or_is_copied_is_named() {
+    let (problem, clean) = arm();
+    let cases: [(Mistake, &str); 2] = [
+        (|at| at.z = 0.35, "the coordinate z holds the same number in all 60 rows"),
+        (|at| at.y = at.x, "each of the coordinates x and y equals the other in all 60 rows"),
+    ];
+    for (mistake, words) in cases {
+        let mut data = clean.clone();
+        data.measurements.positions.iter_mut().for_each(mistake);
+        let found = fit(&problem, &data);
+        let finding = found.finding(FindingCode::ColumnDoubted).map(ToString::to_string);
+        assert!(finding.as_ref().is_some_and(|text| text.contains(words)), "{finding:?}");
+    }
+}
+
+#[test]
 fn rows_that_contradict_the_others_are_named_with_their_mistake() {
     let (problem, clean) = arm();
     assert_eq!(doubted(&fit(&problem, &clean)), None);

@@ -75,7 +75,7 @@ type JointMistake = fn(&mut [f64]);
 #[test]
 fn units_and_orders_of_joint_columns_are_named() {
     let (problem, clean) = arm();
-    let mistakes: [(JointMistake, &str); 3] = [
+    let mistakes: [(JointMistake, &str); 5] = [
         (
             |q| q.iter_mut().for_each(|angle| *angle *= 4096.0 / 360.0),
             "joint angles that are counts of 4096 to a turn",
@@ -88,11 +88,39 @@ fn units_and_orders_of_joint_columns_are_named() {
             |q| q[1..4].rotate_left(1),
             "columns of joints 2, 3 and 4 that hold the angles of joints 3, 4 and 2",
         ),
+        (
+            |q| q.iter_mut().for_each(|angle| *angle = angle.to_radians() * 1e3),
+            "joint angles that are milliradians",
+        ),
+        (
+            |q| {
+                q.swap(0, 1);
+                q.swap(2, 4);
+            },
+            "columns of joints 1 and 2 that are exchanged, and those of joints 3 and 5",
+        ),
     ];
     for (mistake, expected) in mistakes {
         let mut data = clean.clone();
         let joints = data.measurements.joints;
         data.measurements.configurations.chunks_exact_mut(joints).for_each(mistake);
+        let words = named(&problem, &data, FindingCode::Misread);
+        assert!(words.contains(expected), "{words}");
+    }
+}
+
+#[test]
+fn units_and_scales_of_positions_are_named() {
+    let (problem, clean) = arm();
+    let mistakes: [(Mistake, &str); 3] = [
+        (|at| *at *= 1e3, "positions that are micrometres, declared as millimetres"),
+        (|at| *at /= 304.8, "positions that are feet, declared as millimetres"),
+        (|at| at.y *= 1.053, "y of the positions that is 1.0530 times as large as it should be"),
+    ];
+    for (mistake, expected) in mistakes {
+        let mut data = clean.clone();
+        data.measurements.position_unit = Some(1e-3);
+        data.measurements.positions.iter_mut().for_each(mistake);
         let words = named(&problem, &data, FindingCode::Misread);
         assert!(words.contains(expected), "{words}");
     }

@@ -215,3 +215,23 @@ fn planes_of_either_side_are_found() {
         }
     }
 }
+
+#[test]
+fn a_held_plane_that_lies_elsewhere_is_named() {
+    let plane = "name = \"table\"\nkind = \"plane\"\n";
+    let known = format!("{plane}normal = [0, 0, 1]\nat_mm = [0, 0, 205]\n");
+    let around = AROUND.replace(plane, &known);
+    let problem = problem(&format!("\"surface[table].*\" = {{ fixed = true }}\n{around}"));
+    let (arm, _) = true_arm(&problem, 5);
+    let mut bench = Bench::new(arm, 11);
+    let mut table = bench.table(&["position"], 40);
+    for _ in 0..60 {
+        let q = bench.contact(&|at| vec![at.z - 0.2]);
+        let q: Vec<String> = q.iter().map(|q| format!("{q:.12}")).collect();
+        let _ = writeln!(table, "{},,,,,,,table,0,,,", q.join(","));
+    }
+    let found = identify(&problem, &read_dataset(&problem, &table), &Options::default()).unwrap();
+    let held = found.finding(flexcal::fit::FindingCode::HeldParameter).map(ToString::to_string);
+    let is_named = |text: &String| text.contains("surface[table].d is held at 205 mm and fits as");
+    assert!(held.as_ref().is_some_and(is_named), "{:?}", found.findings);
+}

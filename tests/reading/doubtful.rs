@@ -204,3 +204,51 @@ fn quantities_that_contradict_the_problem_are_named() {
         assert_eq!(found.iter().any(|w| expected(&w.kind)), is_warned, "{problem}\n{found:#?}");
     }
 }
+
+#[test]
+fn numbers_that_are_no_readings_are_named_with_their_rows() {
+    let header = HEADER.replace("session", "session,temperature_C");
+    let with = |temperature: &dyn Fn(usize) -> String| {
+        let rows = rows(20, "A", 4);
+        let lines = rows.lines().enumerate();
+        let lines = lines.map(|(row, line)| format!("{line},{}\n", temperature(row)));
+        warnings(&format!("{header}{}", lines.collect::<String>()))
+    };
+    let usual = |row: usize| format!("{:.1}", 18.0 + 0.37 * row as f64);
+    assert_eq!(with(&usual), []);
+    for (value, lost) in [("-99.9", 2), ("999", 1), ("0", 3)] {
+        let found =
+            with(&|row| if row % 7 == 3 && row / 7 < lost { value.into() } else { usual(row) });
+        let [found] = &found[..] else { panic!("{value}: {found:?}") };
+        let WarningKind::NoReading { rows, others, .. } = &found.kind else { panic!("{found:?}") };
+        assert_eq!((*rows, others.len(), found.location.line), (lost, lost - 1, Some(5)));
+    }
+    // Set temperatures of a chamber repeat, and a single cold morning is a reading.
+    assert_eq!(
+        with(&|row| ["20", "21", "60"][usize::from(row > 7) + usize::from(row > 15)].into()),
+        []
+    );
+    assert_eq!(with(&|row| if row == 3 { "4.0".into() } else { usual(row) }), []);
+}
+
+#[test]
+fn a_target_for_each_row_is_asked_about() {
+    let rows: String = rows(20, "", 4)
+        .lines()
+        .enumerate()
+        .map(|(row, line)| format!("{}P{row}\n", line))
+        .collect();
+    let found = warnings(&format!("{}{rows}", HEADER.replace("session", "target")));
+    let is_expected =
+        |warning: &Warning| matches!(warning.kind, WarningKind::TargetPerRow { rows: 20 });
+    assert!(found.iter().any(is_expected), "{found:?}");
+}
+
+#[test]
+fn a_quaternion_beside_joint_angles_is_recognised_by_its_names() {
+    let header = "q1_deg,q2_deg,q3_deg,x_mm,y_mm,z_mm,q1,q2,q3,q4\n1,2,3,1,2,3,0,0,0,1\n";
+    let folder = Folder::new();
+    folder.write("rows.csv", header);
+    let error = Dataset::read_files(&[folder.path("rows.csv")], &arm()).unwrap_err().to_string();
+    assert!(error.contains("qx, qy, qz and qw in their order"), "{error}");
+}

@@ -38,6 +38,8 @@ pub struct Acceptance {
     pub is_placed_anew: bool,
     /// True if the arm was fitted to most of the poses. They are then no test of a tolerance.
     pub are_poses_fitted: bool,
+    /// True if the fit is trusted. Otherwise its held-out errors are no test of a tolerance.
+    pub is_trusted: bool,
     /// Accuracy of the registered nominal arm.
     pub before: Accuracy,
     /// Accuracy of the identified arm.
@@ -47,7 +49,8 @@ pub struct Acceptance {
 impl Acceptance {
     /// Tests a tolerance on the accuracies AP of the identified arm in all poses. Each row without
     /// a prediction is a pose beyond the tolerance. If a base or tool was fitted to the held-out
-    /// rows, or the arm to most of their poses, the verdict is undecided.
+    /// rows, or the arm to most of their poses, or if the fit is not trusted, the verdict is
+    /// undecided.
     pub fn test(&self, tolerance: Tolerance) -> ToleranceTest {
         let lost = std::iter::repeat_n(f64::NAN, self.lost);
         let errors: Vec<f64> = self.poses.iter().map(|pose| pose.after).chain(lost).collect();
@@ -58,6 +61,9 @@ impl Acceptance {
 
     /// Returns the reason for which the held-out poses do not test a tolerance; `None` if they do.
     pub(crate) fn no_test(&self) -> Option<&'static str> {
+        if !self.is_trusted {
+            return Some("the fit is not to be trusted");
+        }
         if self.are_poses_fitted {
             return Some("the arm was fitted to the poses that are held out");
         }
@@ -202,6 +208,7 @@ pub fn acceptance(
         poses,
         lost,
         is_placed_anew,
+        is_trusted: found.is_trusted(),
         are_poses_fitted: found.has(FindingCode::HeldOutPosesFitted),
     })
 }

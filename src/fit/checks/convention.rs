@@ -14,6 +14,8 @@ const MAX_EXPLAINED_RATIO: f64 = 0.2;
 /// Largest ratio of the error with a convention to that with the best one, at which the convention
 /// is also named.
 const MAX_RATIO_TO_BEST: f64 = 1.5;
+/// Inverse of the relative difference of two errors that counts as rounding.
+const EQUAL_ERRORS: f64 = 1e4;
 /// Minimum number of measured orientations from which a convention is found.
 const MIN_PAIRS: usize = 3;
 /// Number of times that the meaning of each row is chosen again.
@@ -79,7 +81,11 @@ pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
         })
         .filter(|(_, error)| *error < MAX_EXPLAINED_RATIO * rms)
         .collect();
-    errors.sort_by(|a, b| a.1.total_cmp(&b.1));
+    // Of readings with the same error, the simpler one, which is listed first, comes first.
+    errors.sort_by(|a, b| {
+        let [one, other] = [a.1, b.1].map(|error| (error.ln() * EQUAL_ERRORS).round());
+        one.total_cmp(&other)
+    });
     let best = errors.first().map_or(0.0, |(_, error)| *error);
     errors
         .into_iter()
@@ -93,6 +99,26 @@ pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
 fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
     let inverse: Reading = Box::new(|q| vec![q.inverse()]);
     let mut readings = vec![("the inverse rotation".to_owned(), inverse)];
+    for axes in 1..7_usize {
+        let is_turned = |axis: &usize| axes >> axis & 1 == 1;
+        let turned: Vec<usize> = (0..3).filter(is_turned).collect();
+        let names: Vec<String> = turned
+            .iter()
+            .map(|&axis| format!("{0} (r{0} or q{0})", ["x", "y", "z"][axis]))
+            .collect();
+        let of_signs: Reading = Box::new(move |q| {
+            let numbers = table_numbers(kind, q).map(|mut angles| {
+                for &axis in &turned {
+                    angles[axis] = -angles[axis];
+                }
+                angles
+            });
+            numbers.map(|angles| rotation_of(kind, &angles)).to_vec()
+        });
+        let verb = if names.len() == 1 { "has" } else { "have" };
+        let name = format!("rotations whose {} {verb} the other sign", names.join(" and "));
+        readings.push((name, of_signs));
+    }
     for order in quaternion_orders() {
         let reordered = move |q: &UnitQuaternion<f64>| {
             let columns = [q.i, q.j, q.k, q.w];

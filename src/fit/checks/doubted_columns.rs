@@ -1,6 +1,7 @@
 //! Check of a fit that is far off: a column that stands still, was filled down by a spreadsheet, was
 //! sorted by itself, or holds something else than the coordinate of its joint.
 
+use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 
 use super::checked_fit::{Check, CheckedFit};
@@ -21,6 +22,9 @@ const MAX_STILL_TRAVEL: f64 = 1e-4;
 const MIN_ROWS: usize = 8;
 /// Largest difference between two steps of a column that was filled down, relative to the step.
 const MAX_UNEQUAL: f64 = 1e-6;
+/// Largest share of the squared spread of predicted points along one direction at which they lie in
+/// a plane.
+const MAX_PLANAR_SHARE: f64 = 1e-4;
 /// Largest ratio of the error without the doubted rows to the error with them at which these rows
 /// are the cause.
 const MAX_RATIO: f64 = 0.2;
@@ -38,7 +42,8 @@ impl Check for ColumnsHoldMeasurements {
         else {
             return Vec::new();
         };
-        let found = filled_or_frozen(fit, before)
+        let found = repeated_coordinate(fit, before)
+            .or_else(|| filled_or_frozen(fit, before))
             .or_else(|| unrelated_to_positions(fit, before))
             .or_else(|| standing_still(fit, before))
             .or_else(|| sorted_by_itself(fit, before))
@@ -178,6 +183,46 @@ fn is_sorted(values: &[f64]) -> bool {
     let mut steps = values.windows(2).map(|pair| pair[1] - pair[0]);
     let is_constant = values.first() == values.last();
     !is_constant && (steps.clone().all(|step| step >= 0.0) || steps.all(|step| step <= 0.0))
+}
+
+/// Reports a coordinate that is the same in all rows although the nominal arm does not move in a
+/// plane, or two coordinates that are equal in all rows.
+fn repeated_coordinate(fit: &CheckedFit, before: f64) -> Option<Finding> {
+    let kind = fit.kind(fit.fitting.measurements.leading());
+    let points = &fit.fitting.measurements.positions;
+    let (first, n) = (points[*kind.rows.first()?], kind.rows.len());
+    let is_in_all =
+        |holds: &dyn Fn(&Vector3<f64>) -> bool| kind.rows.iter().all(|&row| holds(&points[row]));
+    let is_same = |axis: &usize| is_in_all(&|point| point[*axis].total_cmp(&first[*axis]).is_eq());
+    let is_copied =
+        |(a, b): &(usize, usize)| is_in_all(&|point| point[*a].total_cmp(&point[*b]).is_eq());
+    let name = |axis: usize| ["x", "y", "z"][axis].to_owned();
+    let (names, what) = if let Some(axis) = (0..3).find(is_same) {
+        let poses = fit.fitting.poses(&kind.rows);
+        let nominal = fit.fitting.located();
+        let predicted = fit.fitting.model.predicted_targets(&poses, nominal.as_slice());
+        let centre = predicted.iter().sum::<Vector3<f64>>() / n as f64;
+        let squares: Matrix3<f64> =
+            predicted.iter().map(|at| (at - centre) * (at - centre).transpose()).sum();
+        let values = squares.symmetric_eigenvalues();
+        if values.min() <= MAX_PLANAR_SHARE * values.sum() {
+            return None;
+        }
+        (vec![name(axis)], "holds the same number")
+    } else {
+        let (a, b) = [(0, 1), (0, 2), (1, 2)].into_iter().find(is_copied)?;
+        (vec![name(a), name(b)], "equals the other")
+    };
+    if n < MIN_ROWS {
+        return None;
+    }
+    let text = format!(
+        "{} {} {what} in all {n} rows: the positions were not copied whole",
+        if names.len() == 1 { "the coordinate" } else { "each of the coordinates" },
+        names.join(" and ")
+    );
+    let remedy = format!("copy {} from the measurements again", names.join(" and "));
+    Some(finding(&names, before, None, text).with_remedy(remedy))
 }
 
 /// Reports a coordinate that rises or falls from row to row in the whole table while no other does.

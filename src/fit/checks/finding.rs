@@ -156,7 +156,7 @@ finding_codes! {
         "The measurements indicate that the payload hangs at the identified target; the problem does not declare its place.",
         "declare payload_at = \"target\" in [tool], or its place as payload_at_m";
     OrientationMisfit: Error "orientation-misfit" ["rms", "sigma", "conventions"]
-        "The fitted arm misses the measured orientations by more than 2° and 20 σ.",
+        "The fitted arm misses the measured orientations by more than 2° and 20 σ, or their scatter is more than 31 times their declared σ.",
         "check the convention of the orientation columns and their frames";
     LensContradicted: Error "lens-contradicted" ["parameters", "before", "after"]
         "Held intrinsics of a camera cause most of the misfit: with them free it falls by three quarters of what exceeds noise, and beyond chance (F test, probability below 0.0001).",
@@ -212,7 +212,7 @@ finding_codes! {
         "Bounds or constraints cause most of a misfit that contradicts the declared σ: without them less than half of the error remains.",
         "check these limits";
     HeldParameter: Warning "held-parameter" ["parameter", "alike", "before", "after"]
-        "A parameter of the geometry that the problem holds explains most of a misfit that contradicts the declared σ: free, it takes away more than four fifths of what noise does not explain, or the six of a base together more than half.",
+        "A parameter of the geometry that the problem holds explains most of a misfit that contradicts the declared σ: free, it takes away more than four fifths of what noise does not explain, or the six of a base together more than half. The same of the held numbers of a point, an anchor or a surface, which leave less than a twentieth.",
         "free this parameter in [parameters]";
     InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]
         "A few rows cause most of the misfit.",

@@ -27,6 +27,11 @@ const MIN_NAMED_SIGMAS: f64 = 3.0;
 const MIN_GAIN_RATIO: f64 = 3.0;
 /// Number of standard deviations of χ² of noise that are subtracted from the remaining misfit.
 const REMAINING_SIGMAS: f64 = 2.0;
+/// Largest share of what exceeds the noise in χ² that another reading of the intrinsics leaves.
+const MAX_LEFT_BY_READING: f64 = 0.05;
+/// Places of the centre and of the first coefficient of distortion among the numbers of a camera.
+const CENTRE_X: usize = 8;
+const FIRST_COEFFICIENT: usize = 10;
 /// Smallest number of degrees of freedom within views that determines the noise of pixels: its
 /// relative standard error is then √(2/200) = 10 %.
 const MIN_NOISE_FREEDOM: f64 = 200.0;
@@ -46,7 +51,7 @@ pub(in crate::fit) fn lens_finding(
     problem: &Problem,
     data: &Dataset,
     found: &Identification,
-    fit: impl FnOnce(&Problem) -> Result<Identification, IdentifyError>,
+    fit: impl Fn(&Problem) -> Result<Identification, IdentifyError>,
 ) -> Option<Finding> {
     let rows = &data.measurements;
     let is_used = |fixture: usize| {
@@ -111,6 +116,15 @@ pub(in crate::fit) fn lens_finding(
          by chance with probability {chance}",
         words.collect::<Vec<_>>().join(", ")
     );
+    if let Some((words, after)) = other_lens(problem, before, &fit) {
+        let text = format!(
+            "the intrinsics are not as declared: with {words} the reduced χ² falls from \
+             {before:.3} to {after:.3}"
+        );
+        let numbers = [json!(names), json!(before), json!(after)];
+        let finding = Finding::new(FindingCode::LensContradicted, numbers, text);
+        return Some(finding.with_remedy("correct the camera".to_owned()));
+    }
     let numbers = [json!(names), json!(before), json!(after)];
     let remedy = format!("{}, or declare better ones", freeing(problem, &fixed));
     Some(Finding::new(FindingCode::LensContradicted, numbers, text).with_remedy(remedy))
@@ -137,6 +151,60 @@ fn freeing(problem: &Problem, names: &[String]) -> String {
     let free = (!others.is_empty())
         .then(|| format!("free them in [parameters] ({})", rules_in_words(&others)));
     delete.into_iter().chain(free).collect::<Vec<_>>().join("; ")
+}
+
+/// Returns the words of the other reading of the intrinsics of a camera with which the images fit
+/// best, and the reduced χ² with it; `None` if none explains what exceeds the noise in `before`, the
+/// reduced χ² as declared.
+fn other_lens(
+    problem: &Problem,
+    before: f64,
+    fit: impl Fn(&Problem) -> Result<Identification, IdentifyError>,
+) -> Option<(String, f64)> {
+    let cameras = problem.fixtures.iter().enumerate();
+    let read = cameras.flat_map(|(index, fixture)| {
+        let of_camera = lens_readings(fixture).into_iter();
+        of_camera.map(move |(words, known)| (index, words, known))
+    });
+    let explained = read.filter_map(|(index, words, known)| {
+        let mut other = problem.clone();
+        other.fixtures.get_mut(index)?.known = known;
+        let found = fit(&other).ok().filter(|found| found.termination.converged())?;
+        Some((words, found.reduced_chi2?))
+    });
+    let (words, after) = explained.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (after - 1.0 < MAX_LEFT_BY_READING * (before - 1.0)).then_some((words, after))
+}
+
+/// Returns the other readings of the declared centre and distortion of a pinhole camera: their words
+/// and the numbers of the camera.
+fn lens_readings(fixture: &Fixture) -> Vec<(String, Vec<Option<f64>>)> {
+    let (known, name) = (&fixture.known, &fixture.name);
+    if fixture.kind.word() != "camera" || known.len() != FIRST_COEFFICIENT + 5 {
+        return Vec::new();
+    }
+    let with = |places: [usize; 7], factor: f64| {
+        let mut other = known.clone();
+        for (place, &from) in places.iter().enumerate() {
+            let sign = if place < 2 { 1.0 } else { factor };
+            other[CENTRE_X + place] = known[CENTRE_X + from].map(|value| sign * value);
+        }
+        other
+    };
+    let in_order = [0, 1, 2, 3, 4, 5, 6];
+    let readings = [
+        (in_order, 0.0, "distortion = [0, 0, 0, 0, 0] (pixels that are undistorted already)"),
+        (in_order, -1.0, "the distortion of the other sign"),
+        (
+            [0, 1, 2, 3, 5, 6, 4],
+            1.0,
+            "the distortion in the order k1, k2, p1, p2, k3 (written in the order k1, k2, k3, p1, p2)",
+        ),
+        ([1, 0, 2, 3, 4, 5, 6], 1.0, "the two numbers of centre_px exchanged"),
+    ];
+    let readings = readings.map(|(places, factor, words)| (words, with(places, factor)));
+    let changed = readings.into_iter().filter(|(_, other)| other != known);
+    changed.map(|(words, other)| (format!("{words} of camera \"{name}\""), other)).collect()
 }
 
 /// Returns the lines of `[parameters]` that free the intrinsics `names`, one for each kind of

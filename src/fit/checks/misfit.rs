@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::misreading::POSITION_UNITS;
 use super::row_kind::{RowKind, format_error, quantity_noun, spread, suspects};
 use crate::problem::Observation;
 
@@ -26,15 +27,10 @@ const MIN_OTHER_ARM_MISS: f64 = 0.5;
 /// Largest ratio between the spreads of measured and predicted points that is not reported.
 const MAX_SIZE_RATIO: f64 = 2.0;
 /// Ratios of the spread of the nominal arm's points to that of the measured ones, each with the unit
-/// that gives it, and whether the column is then declared in metres instead of millimetres.
-const SIZES_OF_UNITS: [(f64, bool, &str); 6] = [
-    (1e3, false, "the positions are probably in metres, declared as millimetres"),
-    (1e-3, true, "the positions are probably in millimetres, declared as metres"),
-    (25.4, false, "the positions are probably in inches, declared as millimetres"),
-    (10.0, false, "the positions are probably in centimetres, declared as millimetres"),
-    (0.1, false, "the positions are probably in tenths of a millimetre"),
-    (0.01, false, "the positions are probably in hundredths of a millimetre"),
-];
+/// that gives it, and whether the column is then declared in metres instead of millimetres. Other
+/// units than these are in [`POSITION_UNITS`].
+const SIZES_OF_UNITS: [(f64, bool, &str); 2] =
+    [(1e3, false, "metres"), (1e-3, true, "millimetres")];
 /// Largest deviation of such a ratio from that of two units: its logarithm.
 const MAX_OFF_UNIT: f64 = 0.4;
 /// Smallest spread of points from which the size of an arm is judged \[m\], or of tilts from which
@@ -203,13 +199,16 @@ fn other_size_finding((measured, expected): (f64, f64), declared: Option<f64>) -
     let numbers = [measured.into(), expected.into()];
     let finding = Finding::new(FindingCode::OtherSize, numbers, text);
     let ratio = (expected / measured).ln();
-    let unit = SIZES_OF_UNITS.iter().find(|(factor, in_metres, _)| {
+    let others = POSITION_UNITS.into_iter().map(|(factor, name)| (factor, false, name));
+    let unit = SIZES_OF_UNITS.into_iter().chain(others).find(|(factor, in_metres, _)| {
         declared.is_none_or(|unit| (unit >= 1.0) == *in_metres)
             && (ratio - factor.ln()).abs() < MAX_OFF_UNIT
     });
     Some(match unit {
-        Some((.., words)) => finding.with_remedy(format!(
-            "{words}; otherwise check the lengths of the joint table and what the columns hold"
+        Some((_, in_metres, name)) => finding.with_remedy(format!(
+            "the positions are probably in {name}, declared as {}; otherwise check the lengths of \
+             the joint table and what the columns hold",
+            if in_metres { "metres" } else { "millimetres" }
         )),
         None => finding,
     })
@@ -219,6 +218,20 @@ fn other_size_finding((measured, expected): (f64, f64), declared: Option<f64>) -
 mod tests {
     use super::*;
     use crate::problem::Observation;
+
+    #[test]
+    fn the_size_of_the_arm_tells_the_unit() {
+        for (measured, words) in [
+            (5.4e2, "micrometres"),
+            (5.4e-1 / 304.8, "feet"),
+            (5.4e-4, "metres"),
+            (54.0, "hundredths"),
+        ] {
+            let finding = other_size_finding((measured, 0.56), Some(1e-3)).unwrap();
+            assert!(finding.remedy.contains(&format!("probably in {words}")), "{}", finding.remedy);
+        }
+        assert!(other_size_finding((0.5, 0.56), Some(1e-3)).is_none());
+    }
 
     #[test]
     fn a_fit_that_changes_nothing_far_beyond_the_noise_fits_nothing() {

@@ -5,6 +5,7 @@ use serde_json::json;
 use super::checked_fit::{Check, CheckedFit};
 use super::convention::{IN_RADIANS, fitting_conventions};
 use super::finding::{Finding, FindingCode};
+use super::priors::MAX_NOISE_FACTOR;
 
 /// Smallest root mean squared error of orientation at which another convention or frame is
 /// suspected \[rad\]: 2°.
@@ -12,6 +13,8 @@ const MIN_SUSPECT_ANGLE: f64 = 0.035;
 /// Smallest root mean squared error of orientation, as a multiple of the declared σ of orientation,
 /// at which another convention or frame is suspected.
 const MIN_SIGMAS: f64 = 20.0;
+/// Ratios of the scatter of orientations to the declared σ which suggest that σ is in radians.
+const DEGREE_RATIOS: std::ops::Range<f64> = 40.0..80.0;
 
 /// Checks that the predicted orientations of the fitted arm are near the measured ones.
 pub(super) struct OrientationsFit;
@@ -29,7 +32,7 @@ impl Check for OrientationsFit {
             .collect();
         let rms = (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).sqrt();
         if !(rms > MIN_SUSPECT_ANGLE && rms > MIN_SIGMAS * sigma) {
-            return Vec::new();
+            return of_sigma(fit, rms / 3_f64.sqrt(), sigma).into_iter().collect();
         }
         let conventions = fitting_conventions(fit, rms);
         let text = format!(
@@ -49,4 +52,31 @@ impl Check for OrientationsFit {
             None => finding,
         }]
     }
+}
+
+/// Returns the finding that the orientations scatter by far more than their declared `sigma`
+/// \[rad\], although all rows together do not contradict the declared noise. `rms` is that of a
+/// coordinate \[rad\].
+fn of_sigma(fit: &CheckedFit, rms: f64, sigma: f64) -> Option<Finding> {
+    let ratio = rms / sigma;
+    if ratio.powi(2) <= MAX_NOISE_FACTOR || fit.noise_factor > MAX_NOISE_FACTOR {
+        return None;
+    }
+    let text = format!(
+        "the measured orientations scatter by {:.2e}° about the fitted arm, {ratio:.0} times the \
+         declared σ of {:.2e}°",
+        rms.to_degrees(),
+        sigma.to_degrees()
+    );
+    let numbers = [rms.into(), sigma.into(), json!([])];
+    let finding = Finding::new(FindingCode::OrientationMisfit, numbers, text);
+    let is_in_radians = DEGREE_RATIOS.contains(&ratio);
+    Some(finding.with_remedy(if is_in_radians {
+        format!(
+            "orientation_sigma_deg is probably in radians: write {:.3}",
+            sigma.to_degrees().to_degrees()
+        )
+    } else {
+        "check size and unit of orientation_sigma_deg".to_owned()
+    }))
 }

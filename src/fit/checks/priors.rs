@@ -10,6 +10,7 @@ use crate::error::Location;
 use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 use crate::quantity::Unit;
+use crate::quantity::format::decimals;
 
 /// Checks that the poses measure at least as many independent coordinates as there are fitted
 /// parameters.
@@ -28,7 +29,17 @@ impl Check for DataDecide {
              most of it"
         );
         let numbers = [poses.into(), coordinates.into(), parameters.into()];
-        vec![Finding::new(FindingCode::PriorsDecide, numbers, text).with_remedy(String::new())]
+        let split = fit.fitting.split;
+        let (fitted, held_out) = (split.identification.len(), split.held_out.len());
+        let remedy = if held_out > fitted {
+            format!(
+                "{held_out} rows are held out and {fitted} are fitted: check whether the words that \
+                 mark them are exchanged"
+            )
+        } else {
+            String::new()
+        };
+        vec![Finding::new(FindingCode::PriorsDecide, numbers, text).with_remedy(remedy)]
     }
 }
 
@@ -77,7 +88,7 @@ impl Check for PriorsHold {
 const MAX_EQUAL_NOISE_FACTOR: f64 = 1.0 + 1e-9;
 /// Largest ratio of the noise variance that the fit assumed to the declared one, at which the fit
 /// is still trusted. Above it, the declared σ would be more than 30 times too small.
-const MAX_NOISE_FACTOR: f64 = 1000.0;
+pub(super) const MAX_NOISE_FACTOR: f64 = 1000.0;
 /// Ratios of the σ that the fit assumed to the declared one which suggest a unit wrong by a factor
 /// of 1000, for example metres entered under a key in millimetres.
 const UNIT_RATIOS: std::ops::Range<f64> = 600.0..1600.0;
@@ -167,11 +178,12 @@ impl Check for SigmaIsNotOverstated {
             _ if is_position => fit.problem.data.position_sigma_location.to_string(),
             _ => format!("{}_sigma, {}", kind.observation.kind(), fit.problem.data.location),
         };
+        let shown = |error: f64| format_error(name, error, decimals(1e3 * error, 9).max(4));
         let text = format!(
             "the declared σ of {} ({place}) is {:.0} times the {} that the fit leaves",
-            format_error(name, sigma, 4),
+            shown(sigma),
             sigma / rms,
-            format_error(name, rms, 4)
+            shown(rms)
         );
         let finding = Finding::new(FindingCode::SigmaOverstated, [sigma.into(), rms.into()], text);
         vec![if sigma > MIN_COMPUTED_RATIO * rms {
@@ -180,7 +192,9 @@ impl Check for SigmaIsNotOverstated {
                  computed positions"
                     .to_owned(),
             )
-        } else if kind.observation.description().unit == Unit::Length {
+        } else if kind.observation.description().unit == Unit::Length
+            && sigma / rms < UNIT_RATIOS.end
+        {
             finding
         } else {
             finding.with_remedy("check its size and unit".to_owned())

@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
+use super::axis_scale::TRIAL_RATIOS;
 use super::commands::{TURN_UNITS, of_commands, of_mixed_units, turns_in};
-use super::{MassScale, Misreading};
+use super::{MassScale, Misreading, POSITION_UNITS};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Joint, JointKind, Problem};
@@ -59,14 +60,17 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(of_slides(problem, table));
     units.extend(lengths(false).then_some(Misreading::Metres));
     units.extend(lengths(true).then_some(Misreading::Millimetres));
-    units.extend(lengths(false).then_some(Misreading::Inches));
-    units.extend(lengths(false).then_some(Misreading::Centimetres));
+    let others = (0..POSITION_UNITS.len()).filter(|_| lengths(false));
+    units.extend(others.map(|unit| Misreading::PositionUnit { unit }));
     let powers = if lengths(false) { [3, 1] } else { [-3, -2] };
     let of_axis = |axis: usize| powers.map(|power| Misreading::AxisUnit { axis, power });
     units.extend((0..3).flat_map(of_axis));
     if lengths(false) {
         units.extend((0..3).map(|axis| Misreading::AxisInches { axis }));
     }
+    let scaled = |axis: usize| TRIAL_RATIOS.map(|ratio| (axis, ratio));
+    let scaled = (0..3).flat_map(scaled);
+    units.extend(scaled.map(|(axis, millionths)| Misreading::AxisScale { axis, millionths }));
     units.push(Misreading::Mirrored { axes: None });
     units.extend(TRIAL_SCALES.map(|percent| Misreading::Scale { percent }));
     units.extend(table.orientations.is_some().then_some(Misreading::InversePose));

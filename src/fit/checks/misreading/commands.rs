@@ -17,11 +17,37 @@ const ZERO_POSITION_STEP: i16 = 15;
 /// The last one is that of degrees to radians.
 const TRIAL_RATIOS: [i16; 21] =
     [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 97, 103, 110, 125, 150, 200, 300, 400, 500, 1000, 5730];
-/// Numbers of units to a turn, of units that are taken for degrees: gradians, tenths and hundredths
-/// of a degree, and usual numbers of counts of encoders.
-pub(super) const TURN_UNITS: [u32; 20] = [
-    400, 1000, 1024, 2000, 2048, 2500, 3600, 4000, 4096, 5000, 8000, 8192, 10_000, 16_384, 32_768,
-    36_000, 65_536, 131_072, 262_144, 1_048_576,
+/// Number that stands for the 2000 π milliradians of a turn.
+pub(super) const MILLIRADIANS: u32 = 6283;
+/// Numbers of units to a turn, of units that are taken for degrees: turns, degrees divided by 60,
+/// gradians, tenths and hundredths of a degree, milliradians, minutes and seconds of arc,
+/// and usual numbers of counts of encoders.
+pub(super) const TURN_UNITS: [u32; 25] = [
+    1,
+    6,
+    MILLIRADIANS,
+    21_600,
+    1_296_000,
+    400,
+    1000,
+    1024,
+    2000,
+    2048,
+    2500,
+    3600,
+    4000,
+    4096,
+    5000,
+    8000,
+    8192,
+    10_000,
+    16_384,
+    32_768,
+    36_000,
+    65_536,
+    131_072,
+    262_144,
+    1_048_576,
 ];
 /// Maximum number of joints in another unit than the rest of which every subset is tried.
 const MAX_SUBSETS: usize = 4;
@@ -73,6 +99,22 @@ fn of_rings(joints: &[usize]) -> impl Iterator<Item = Misreading> {
     triples.flat_map(|(a, b, c)| [[a, b, c], [a, c, b]].map(|joints| Misreading::Cycled { joints }))
 }
 
+/// Returns the misreadings that two pairs of the joints are exchanged.
+fn of_pairs(joints: &[usize]) -> Vec<Misreading> {
+    let joints = if joints.len() > MAX_CYCLED { &[] } else { joints };
+    let pairs = joints
+        .iter()
+        .enumerate()
+        .flat_map(|(k, &joint)| joints[k + 1..].iter().map(move |&with| [joint, with]));
+    let pairs: Vec<[usize; 2]> = pairs.collect();
+    let of_first = |(k, &[a, b]): (usize, &[usize; 2])| {
+        let apart =
+            pairs[k + 1..].iter().filter(move |pair| !pair.contains(&a) && !pair.contains(&b));
+        apart.map(move |&[c, d]| Misreading::ExchangedPairs { joints: [a, b, c, d] }).collect()
+    };
+    pairs.iter().enumerate().flat_map::<Vec<_>, _>(of_first).collect()
+}
+
 /// Returns the misreadings of the joint columns: signs, exchanged columns, couplings, zero
 /// positions and ratios.
 pub(super) fn of_commands(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
@@ -107,6 +149,7 @@ pub(super) fn of_commands(problem: &Problem, table: &Measurements) -> Vec<Misrea
         }
     }
     misreadings.extend(of_rings(&turning));
+    misreadings.extend(of_pairs(&turning));
     keep_different_orders(&mut misreadings, problem, table);
     for &joint in &turning {
         let steps =
@@ -123,12 +166,17 @@ pub(super) fn of_commands(problem: &Problem, table: &Measurements) -> Vec<Misrea
 
 /// Removes exchanges of columns that give the same order as an earlier one.
 fn keep_different_orders(of: &mut Vec<Misreading>, problem: &Problem, table: &Measurements) {
-    use Misreading::{Alphabetical, Cycled, Exchanged, OppositeOrder, Rotated};
+    use Misreading::{Alphabetical, Cycled, Exchanged, ExchangedPairs, OppositeOrder, Rotated};
     let mut orders = Vec::new();
     of.retain(|misreading| {
         let exchanges = matches!(
             misreading,
-            OppositeOrder | Alphabetical | Rotated { .. } | Exchanged { .. } | Cycled { .. }
+            OppositeOrder
+                | Alphabetical
+                | Rotated { .. }
+                | Exchanged { .. }
+                | Cycled { .. }
+                | ExchangedPairs { .. }
         );
         let mut order: Vec<f64> = (0_u16..).map(f64::from).take(problem.joints.len()).collect();
         misreading.undo_command(&mut order, problem, table);
@@ -167,6 +215,7 @@ impl Misreading {
             Self::Degrees | Self::Radians | Self::TurnUnit { .. } => {
                 let (factor, is_radians) = match self {
                     Self::Degrees => (PI / 180.0, true),
+                    Self::TurnUnit { per_turn: MILLIRADIANS } => (0.18 / PI, false),
                     Self::TurnUnit { per_turn } => (360.0 / f64::from(per_turn), false),
                     _ => (180.0 / PI, false),
                 };
@@ -210,6 +259,10 @@ impl Misreading {
                 q.swap(first - 1, third - 1);
             }
             Self::Exchanged { joint, with } => q.swap(joint - 1, with - 1),
+            Self::ExchangedPairs { joints: [a, b, c, d] } => {
+                q.swap(a - 1, b - 1);
+                q.swap(c - 1, d - 1);
+            }
             Self::Coupled { joint, from, is_opposite } => {
                 let sign = if is_opposite { -1.0 } else { 1.0 };
                 q[joint - 1] += sign * q[from - 1];
@@ -227,4 +280,20 @@ impl Misreading {
 /// Returns the rotation of a screw divided by its travel \[rad/m\], given its lead \[mm\].
 pub(super) fn radians_per_metre(lead: i16) -> f64 {
     2.0 * PI * 1e3 / f64::from(lead)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_pairs_of_joints_are_disjoint() {
+        let pairs = of_pairs(&[1, 2, 3, 4, 5]);
+        assert_eq!(pairs.len(), 15);
+        assert!(pairs.contains(&Misreading::ExchangedPairs { joints: [1, 2, 3, 5] }));
+        for pair in pairs {
+            let Misreading::ExchangedPairs { joints } = pair else { panic!() };
+            assert_eq!(BTreeSet::from(joints).len(), 4, "{joints:?}");
+        }
+    }
 }

@@ -5,6 +5,7 @@
 //! registered to that copy ([`search`]). The misreadings with the smallest errors are then fitted
 //! in full. Linearised tests at a fit with a large error would not find them.
 
+mod axis_scale;
 mod candidates;
 mod chosen_rows;
 mod commands;
@@ -66,10 +67,11 @@ pub enum Misreading {
     Metres,
     /// Positions are in millimetres, declared as metres.
     Millimetres,
-    /// Positions are in inches, declared as millimetres.
-    Inches,
-    /// Positions are in centimetres, declared as millimetres.
-    Centimetres,
+    /// Positions are in another unit than metres, declared as millimetres.
+    PositionUnit {
+        /// Index of the unit in [`POSITION_UNITS`].
+        unit: usize,
+    },
     /// All positions are longer or shorter by one factor, because the instrument or the joint table
     /// has a wrong scale.
     Scale {
@@ -94,6 +96,12 @@ pub enum Misreading {
         joint: usize,
         /// Number of the second joint, from 1.
         with: usize,
+    },
+    /// The columns of two pairs of joints, by number, are exchanged.
+    ExchangedPairs {
+        /// Numbers of the joints, from 1: the first is exchanged with the second, the third with the
+        /// fourth.
+        joints: [usize; 4],
     },
     /// The columns of all joints are in the opposite order.
     OppositeOrder,
@@ -121,6 +129,13 @@ pub enum Misreading {
         axis: usize,
         /// Exponent of the power of ten by which the coordinate must be multiplied.
         power: i8,
+    },
+    /// One coordinate of the positions is longer or shorter than the others by a factor.
+    AxisScale {
+        /// Coordinate, 0…2 for x, y, z.
+        axis: usize,
+        /// Ratio of the coordinate to the two others, in millionths.
+        millionths: u32,
     },
     /// One coordinate of the positions is in inches, declared as millimetres.
     AxisInches {
@@ -322,6 +337,17 @@ pub enum Misreading {
     },
 }
 
+/// Units of positions that are taken for millimetres: length \[mm\] and name.
+pub(in crate::fit) const POSITION_UNITS: [(f64, &str); 7] = [
+    (25.4, "inches"),
+    (10.0, "centimetres"),
+    (1e-3, "micrometres"),
+    (0.1, "tenths of a millimetre"),
+    (0.01, "hundredths of a millimetre"),
+    (100.0, "decimetres"),
+    (304.8, "feet"),
+];
+
 /// Weight of a kilogram \[N\].
 const STANDARD_GRAVITY: f64 = 9.80665;
 
@@ -396,8 +422,12 @@ impl Misreading {
                 (fixture, with, None)
             }
             Self::TurnUnit { per_turn } => (per_turn as usize, 0, None),
+            Self::PositionUnit { unit } => (unit, 0, None),
             Self::Cycled { joints: [first, second, third] } => (first, 64 * second + third, None),
-            Self::AxisUnit { axis, .. } | Self::AxisInches { axis } => (axis, 0, None),
+            Self::ExchangedPairs { joints: [a, b, c, d] } => (64 * a + b, 64 * c + d, None),
+            Self::AxisUnit { axis, .. }
+            | Self::AxisInches { axis }
+            | Self::AxisScale { axis, .. } => (axis, 0, None),
             Self::ExchangedRows { row } => (row, 0, None),
             Self::ExchangedLengths { joint, field, with, other } => {
                 (joint, 2 * with + usize::from(other == JointField::D), Some(field))

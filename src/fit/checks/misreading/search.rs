@@ -76,9 +76,9 @@ const TRIAL_TOLERANCE: f64 = 1e-4;
 const MAX_SET_ASIDE_SHARE: f64 = 0.3;
 
 /// Result of a trial with a misreading corrected.
-struct Outcome {
+pub(super) struct Outcome {
     /// Root mean squared error \[m\]; after a full fit it includes the deviations from priors.
-    rms: f64,
+    pub rms: f64,
     /// Fitted size of the misreading; `None` without a full fit, or if the misreading has no size.
     size: Option<f64>,
     /// Cross-validation misfit of a full fit; `None` without one.
@@ -247,6 +247,7 @@ impl<'a> Trial<'a> {
             .map(|(misreading, _)| *misreading)
             .filter(|misreading| is_first(misreading))
             .take(MAX_FITTED_MISREADINGS)
+            .map(|misreading| self.with_best_ratio(misreading))
             .collect();
         self.explained(&chosen, MAX_EXPLAINED_RATIO * as_read)
     }
@@ -257,6 +258,9 @@ impl<'a> Trial<'a> {
         let explanation = |&misreading: &Misreading| {
             let Outcome { rms, size, left_out, is_within_priors } =
                 self.outcome(misreading, true)?;
+            if misreading.is_minute() {
+                return None;
+            }
             // A negative ratio means that the joint turns against its command, and one of 1 is no
             // misreading.
             let is_impossible = |size: f64| match misreading {
@@ -296,7 +300,7 @@ impl<'a> Trial<'a> {
 
     /// Returns the errors with a misreading corrected: those of the registered nominal arm or, if
     /// `is_fitted`, those after a full fit. `None` if the misreading cannot be corrected or fitted.
-    fn outcome(&self, misreading: Misreading, is_fitted: bool) -> Option<Outcome> {
+    pub(super) fn outcome(&self, misreading: Misreading, is_fitted: bool) -> Option<Outcome> {
         self.with_corrected(misreading, is_fitted, |fitting, corrected| {
             let rows = &fitting.split.identification;
             if !is_fitted {

@@ -9,7 +9,7 @@ use super::candidates::{
 };
 use super::commands::radians_per_metre;
 use super::images::shift_views;
-use super::{MassScale, Misreading, STANDARD_GRAVITY, power_of_ten};
+use super::{MassScale, Misreading, POSITION_UNITS, STANDARD_GRAVITY, power_of_ten};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Effect, Joint, ParameterRule, Problem};
@@ -302,8 +302,10 @@ impl Misreading {
         match self {
             Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
             Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
-            Self::Inches => rows.positions.iter_mut().for_each(|position| *position *= MM_PER_INCH),
-            Self::Centimetres => rows.positions.iter_mut().for_each(|position| *position *= 10.0),
+            Self::PositionUnit { unit } => {
+                let (millimetres, _) = POSITION_UNITS[unit];
+                rows.positions.iter_mut().for_each(|position| *position *= millimetres);
+            }
             Self::Scale { percent } => {
                 rows.positions.iter_mut().for_each(|at| *at *= 100.0 / f64::from(percent));
             }
@@ -343,6 +345,10 @@ impl Misreading {
             }
             Self::AxisUnit { axis, power } => {
                 rows.positions.iter_mut().for_each(|at| at[axis] *= power_of_ten(power));
+            }
+            Self::AxisScale { axis, millionths } => {
+                let factor = 1e6 / f64::from(millionths);
+                rows.positions.iter_mut().for_each(|position| position[axis] *= factor);
             }
             Self::AxisInches { axis } => {
                 rows.positions.iter_mut().for_each(|position| position[axis] *= MM_PER_INCH);

@@ -193,6 +193,7 @@ impl Misreading {
                     | Self::Rotated { .. }
                     | Self::Exchanged { .. }
                     | Self::Cycled { .. }
+                    | Self::ExchangedPairs { .. }
                     | Self::Coupled { .. }
                     | Self::Screw { .. }
                     | Self::Zero { .. }

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 use std::fmt;
 
 use super::candidates::name_of_mass;
-use super::{MassScale, Misreading, numbers_of, power_of_ten};
+use super::commands::MILLIRADIANS;
+use super::{MassScale, Misreading, POSITION_UNITS, numbers_of, power_of_ten};
 use crate::error::Location;
 use crate::model::parameter::JointField;
 use crate::problem::fixture::carrier_word;
@@ -195,7 +196,12 @@ impl fmt::Display for Misreading {
             Self::TurnUnit { per_turn } => {
                 f.write_str("joint angles that are ")?;
                 match per_turn {
+                    1 => f.write_str("turns"),
+                    6 => f.write_str("divided by 60"),
                     400 => f.write_str("gradians"),
+                    MILLIRADIANS => f.write_str("milliradians"),
+                    21_600 => f.write_str("minutes of arc"),
+                    1_296_000 => f.write_str("seconds of arc"),
                     3600 => f.write_str("tenths of a degree"),
                     36_000 => f.write_str("hundredths of a degree"),
                     _ => write!(f, "counts of {per_turn} to a turn"),
@@ -225,9 +231,8 @@ impl fmt::Display for Misreading {
             ),
             Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
             Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
-            Self::Inches => f.write_str("positions that are inches, declared as millimetres"),
-            Self::Centimetres => {
-                f.write_str("positions that are centimetres, declared as millimetres")
+            Self::PositionUnit { unit } => {
+                write!(f, "positions that are {}, declared as millimetres", POSITION_UNITS[unit].1)
             }
             Self::Mirrored { axes: None } => {
                 f.write_str("two of x, y and z that are exchanged, or one of the other sign")
@@ -257,6 +262,10 @@ impl fmt::Display for Misreading {
                 };
                 let name = ['x', 'y', 'z'][axis];
                 write!(f, "{name} alone that is in {found}, declared in {declared}")
+            }
+            Self::AxisScale { axis, millionths } => {
+                let (name, ratio) = (['x', 'y', 'z'][axis], f64::from(millionths) * 1e-6);
+                write!(f, "{name} of the positions that is {ratio:.4} times as large as it should be")
             }
             Self::AxisInches { axis } => {
                 let name = ['x', 'y', 'z'][axis];
@@ -318,6 +327,10 @@ impl Misreading {
             Self::Exchanged { joint, with } => {
                 write!(f, "columns of joints {joint} and {with} that are exchanged")
             }
+            Self::ExchangedPairs { joints: [a, b, c, d] } => write!(
+                f,
+                "columns of joints {a} and {b} that are exchanged, and those of joints {c} and {d}"
+            ),
             Self::Coupled { joint, from, is_opposite } => {
                 let sign = if is_opposite { "minus " } else { "" };
                 write!(f, "joint {joint} that also turns by {sign}the command of joint {from}")
