@@ -236,8 +236,9 @@ fn a_target_for_each_row_is_asked_about() {
     let rows: String = rows(20, "", 4)
         .lines()
         .enumerate()
-        .map(|(row, line)| format!("{}P{row}\n", line))
-        .collect();
+        .map(|(row, line)| format!("{line}P{row}\n"))
+        .collect::<Vec<_>>()
+        .concat();
     let found = warnings(&format!("{}{rows}", HEADER.replace("session", "target")));
     let is_expected =
         |warning: &Warning| matches!(warning.kind, WarningKind::TargetPerRow { rows: 20 });

@@ -54,9 +54,12 @@ fn dates_of_the_joint_table_are_times_under_either_name() {
 fn dates_are_paired_with_milliseconds_since_the_start_of_a_controller() {
     let second = |k: u32| 20 * k + k * k % 13;
     let date = |k: u32| format!("2026-03-11T09:{:02}:{:02}Z", second(k) / 60, second(k) % 60);
-    let measured: String = (0..12).map(|k| format!("{k},2,3,{}\n", date(k))).collect();
-    let logged: String =
-        (0..12).map(|k| format!("{},{k},7\n", 1000 * second(k) + 5_000_000)).collect();
+    let measured: String =
+        (0..12).map(|k| format!("{k},2,3,{}\n", date(k))).collect::<Vec<_>>().concat();
+    let logged: String = (0..12)
+        .map(|k| format!("{},{k},7\n", 1000 * second(k) + 5_000_000))
+        .collect::<Vec<_>>()
+        .concat();
     let read = |more: &str| {
         let text = format!(
             "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['log.csv'], by = 'time'{more} }}\n\
