@@ -268,16 +268,17 @@ mod tests {
     }
     #[test]
     fn the_clock_of_a_continuous_log_is_found_by_its_rests() {
-        // The arm moves for 8 s, and rests for 7 to 13 s; twice a second a row is logged.
+        // The arm moves for 8 s, and rests for 7 to 22 s; twice a second a row is logged.
         let mut rows: Vec<(f64, ByteRecord)> = Vec::new();
         let (mut time, mut measured) = (1000.0, Vec::new());
-        for pose in 0..40 {
-            for k in 0..2 * (15 + pose * pose % 7) {
-                let at = f64::from(pose) * 30.0 - (15.0 - f64::from(k)).max(0.0) * 2.0;
+        for pose in 0..40_i32 {
+            let rest = 14 + pose * pose * 7 % 31;
+            for k in 0..16 + rest {
+                let at = 30 * pose - 2 * (16 - k).max(0);
                 rows.push((time, ByteRecord::from(vec![time.to_string(), at.to_string()])));
                 time += 0.5;
             }
-            measured.push(time - 1.0 - f64::from(pose % 5) + 3641.7);
+            measured.push(time - f64::from(rest) / 4.0 + f64::from(pose % 5 - 2) + 3641.7);
         }
         let rests = rests(rows.iter().map(|(time, cells)| (*time, cells)), Some(0));
         assert_eq!(rests.len(), 40);
@@ -290,7 +291,7 @@ mod tests {
         };
         assert_eq!(moved(shift), None);
         assert!((shift - 3641.7).abs() < 3.0, "{shift}");
-        let later = moved(shift + 4.0);
+        let later = moved(shift + 3.0);
         assert!(matches!(later, Some(WarningKind::MovedAtTime { rows: 1.., of: 40, .. })));
         // One row for each pose is no continuous log.
         let few = rows.iter().step_by(40).map(|(time, cells)| (*time, cells));

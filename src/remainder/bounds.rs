@@ -11,6 +11,11 @@ use crate::quantity::format::percent_of;
 /// Probability of as many exceeded bounds by chance below which the bounds are contradicted.
 const MIN_CHANCE_OF_EXCESS: f64 = 0.01;
 
+/// Number of probabilities between 0 and 1 at which quantiles of errors are computed.
+const CHANCES: usize = 1000;
+/// Number of halvings of the interval in which a bound is sought.
+const HALVINGS: usize = 40;
+
 /// Uncertainty of predicted poses, and error bounds that hold with the probability `level`.
 #[derive(Debug, Clone)]
 pub struct Bounds {
@@ -97,9 +102,9 @@ impl Bounds {
     /// Returns the bounds for the case that, with the probability `share`, each pose errs by
     /// another `differences` \[m\] in addition.
     ///
-    /// P(error ≤ b) = (1 − w) P(e ≤ b) + w P(|e + d| ≤ b), with the share w and the difference d. It
-    /// is at least `level` for b = d + q((level − 1 + w) / w), for b = d + q(level), and for
-    /// b = q(level / (1 − w)), with the quantile q of e. The smallest of these is taken.
+    /// The bound b is the smallest with (1 − w) P(e ≤ b) + w P(e ≤ b − d) ≥ `level`, for the share w,
+    /// the difference d and the error e, whose quantiles `quantile` returns as multiples of its
+    /// expected length.
     #[must_use]
     pub(super) fn with_differences(
         mut self,
@@ -107,14 +112,29 @@ impl Bounds {
         share: f64,
         differences: &[f64],
     ) -> Self {
-        let quantile = |level: f64| if level < 1.0 { quantile(level) } else { f64::INFINITY };
-        let beside = quantile(((self.level - 1.0 + share) / share).clamp(0.0, self.level));
-        let alone = quantile(self.level / (1.0 - share));
-        let is_likely = share > 1.0 - self.level;
-        let beside = if is_likely { beside } else { quantile(self.level) };
+        let chance_of = |k: usize| k as f64 / CHANCES as f64;
+        let quantiles: Vec<f64> = (0..CHANCES).map(|k| quantile(chance_of(k))).collect();
+        let chance = |ratio: f64| {
+            chance_of(quantiles.partition_point(|known| *known <= ratio).saturating_sub(1))
+        };
+        let level = self.level;
         let poses = self.poses.iter_mut().zip(&mut self.lengths).zip(differences);
         for ((pose, length), difference) in poses {
-            *length = (difference + beside * pose.size).min(alone * pose.size);
+            let holds = |bound: f64| {
+                let [without, with] =
+                    [bound, bound - difference].map(|bound| chance(bound / pose.size));
+                (1.0 - share) * without + share * with >= level
+            };
+            let (mut low, mut high) = (0.0, *length + difference);
+            for _ in 0..HALVINGS {
+                let middle = f64::midpoint(low, high);
+                if holds(middle) {
+                    high = middle;
+                } else {
+                    low = middle;
+                }
+            }
+            *length = high;
             pose.size = pose.size.hypot(share.sqrt() * difference);
         }
         self
@@ -226,6 +246,6 @@ mod tests {
             assert!(b <= difference + 1e-3, "{share} {difference}: {b}");
         }
         // One that hardly ever acts does not enlarge the bound by all that it would change.
-        assert!(bound(0.04, 5e-3) < 1.0e-3);
+        assert!(bound(0.04, 5e-3) < 1.0e-3 && bound(0.0, 5e-3) < 0.96e-3);
     }
 }

@@ -3,13 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use flexcal::fit::{FindingCode, Options};
+use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Split};
-use flexcal::problem::{Effect, Problem};
+use flexcal::problem::Problem;
 use flexcal::rig::{Truth, simulate};
 use flexcal::select::{Status, Verdict, close};
 use flexcal::study::table;
-use nalgebra::Vector3;
 
 const POSES: &str = "[random]\n'joint*.*' = { sigma_deg = 0.05, sigma_mm = 0.5, sigma_relative = 0.1 }\n\
     'tool.*' = { sigma_mm = 1 }\n[noise]\nposition_sigma_mm = 0.05\n[poses]\nq1_deg = [-160, 160]\n\
@@ -34,39 +33,5 @@ fn wrong_masses_and_a_payload_elsewhere_are_named() {
             closure.effects.iter().map(|found| (found.effect.name(), found.status)).collect();
         assert_eq!(found, [(name, Status::Found)]);
         assert_eq!(closure.verdict, Verdict::Explained);
-    }
-}
-
-#[test]
-fn gravity_along_another_axis_of_the_base_is_named() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/honest/six.toml");
-    let text = fs::read_to_string(&path).unwrap();
-    let rigid: Vec<&str> = text.lines().filter(|line| !line.contains("stiffness")).collect();
-    let mut problem = Problem::parse(&rigid.join("\n"), &path).unwrap();
-    // The arm hangs on a wall.
-    let along_x = Vector3::new(-9.80665, 0.0, 0.0);
-    problem.gravity = along_x;
-    let truth = format!(
-        "[[effect]]\njoint-compliance = {{ joint = 2 }}\ncompliance_rad_per_N_m = 3e-6\n{POSES}"
-    );
-    let truth = Truth::parse(&truth, Path::new("TRUTH.toml"), &problem).unwrap();
-    let rows = simulate(&problem, &truth, 70, 5).unwrap().rows;
-    let split = Split { identification: (0..50).collect(), held_out: (50..70).collect() };
-    let data = Dataset::new(table(&rows), split);
-    let mut closed = |gravity: Vector3<f64>| {
-        problem.gravity = gravity;
-        close(&problem, &data, &Options::default()).unwrap()
-    };
-    let right = closed(along_x);
-    assert_eq!(right.verdict, Verdict::Explained);
-    assert_eq!(right.effects[0].effect, Effect::JointCompliance { joint: 2 });
-    // Forgotten, so that it is along −z, and with the other sign.
-    for wrong in [Vector3::new(0.0, 0.0, -9.80665), -along_x] {
-        let loop_ = closed(wrong);
-        let said = loop_.after.finding(FindingCode::Misread).map(ToString::to_string);
-        let said = said.unwrap_or_default();
-        let expected = "with gravity_m_s2 = [-9.80665, 0, 0] and joint 2 giving way";
-        assert!(said.contains(expected), "{said}");
-        assert_ne!(loop_.verdict, Verdict::Explained);
     }
 }
