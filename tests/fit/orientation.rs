@@ -7,7 +7,8 @@ use crate::common::arms::{parse, path};
 use crate::common::made::fit;
 use crate::common::reading::try_poses;
 use flexcal::fit::{
-    Identification, Options, Placement, compensate, identify, seen_from_base, waypoints,
+    FindingCode, Identification, Options, Placement, compensate, identify, seen_from_base,
+    waypoints,
 };
 use flexcal::least_squares::check_jacobian;
 use flexcal::measurement::Dataset;
@@ -275,4 +276,32 @@ fn the_loop_is_that_of_positions() {
     let without = close(&problem.positions_alone(), &data, &Options::default()).unwrap();
     assert_eq!((with.verdict, &with.after.x), (without.verdict, &without.after.x));
     assert!(with.effects.iter().any(|found| found.effect == Effect::GearRatio { joint: 3 }));
+}
+
+#[test]
+fn a_sigma_in_radians_and_a_sign_of_rotation_vectors_are_named() {
+    let problem = ur10();
+    let (_, mut data) = rig(&problem, 60, 3, "held_out = 0.3\n");
+    let turns = data.measurements.orientations.clone().unwrap();
+    let reversed = |turn: &UnitQuaternion<f64>| {
+        let vector = turn.scaled_axis();
+        UnitQuaternion::from_scaled_axis(Vector3::new(vector.x, vector.y, -vector.z))
+    };
+    data.measurements.orientations = Some(turns.iter().map(reversed).collect());
+    let remedy = |problem: &Problem, data: &Dataset| {
+        let found = fit(problem, data);
+        found.finding(FindingCode::OrientationMisfit).map(|finding| finding.remedy.clone())
+    };
+    let named = remedy(&problem, &data).unwrap();
+    assert!(named.contains("rotations whose z (rz or qz) has the other sign"), "{named}");
+    let noisy = |(row, turn): (usize, &UnitQuaternion<f64>)| {
+        let noise = |factor: f64| 5e-4 * (factor * row as f64).sin();
+        turn * UnitQuaternion::from_scaled_axis(Vector3::new(noise(1.3), noise(2.1), noise(2.9)))
+    };
+    data.measurements.orientations = Some(turns.iter().enumerate().map(noisy).collect());
+    assert_eq!(remedy(&problem, &data), None);
+    let mut declared = problem.clone();
+    declared.data.orientation_sigma = declared.data.orientation_sigma.map(f64::to_radians);
+    let named = remedy(&declared, &data).unwrap();
+    assert!(named.contains("in radians: write 0.020"), "{named}");
 }
