@@ -82,6 +82,7 @@ struct Found {
 struct Alternative {
     #[serde(flatten)]
     named: Named,
+    #[serde(default)]
     probability: f64,
 }
 

@@ -109,12 +109,8 @@ pub fn identify_model(
         let provisional = Options { warm_start, ..provisional_options(&found, options) };
         let without = |rows: &[usize]| {
             let left_out: BTreeSet<usize> = rows.iter().copied().collect();
-            let kept = split
-                .identification
-                .iter()
-                .copied()
-                .filter(|row| !left_out.contains(row))
-                .collect();
+            let rows = split.identification.iter().copied();
+            let kept = rows.filter(|row| !left_out.contains(row)).collect();
             let split = Split { identification: kept, held_out: split.held_out.clone() };
             fit_rows(model, problem, (measurements, &split), &provisional).ok()
         };
@@ -480,12 +476,11 @@ fn rules(problem: &Problem, unknowns: &[&Parameter]) -> Vec<Option<String>> {
 fn not_converged_finding(reason: Termination) -> Finding {
     let text = reason.to_string();
     let finding = Finding::new(FindingCode::NotConverged, [reason.as_str().into()], text);
-    finding.with_remedy(match reason {
-        Termination::DomainEdge => {
-            "units, signs of joints, or sessions are wrong, or the table's columns".to_owned()
-        }
-        _ => String::new(),
-    })
+    let remedy = match reason {
+        Termination::DomainEdge => "units, signs of joints, sessions, or the columns are wrong",
+        _ => "",
+    };
+    finding.with_remedy(remedy.to_owned())
 }
 
 /// Returns the loss that the section `[robust]` declares. Defaults of its threshold and slope are

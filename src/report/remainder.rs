@@ -219,8 +219,8 @@ impl PredictionAccuracy {
             let [rms, max] = [errors.rms.norm, errors.max.norm].map(|of| number(of * 1e3, 2));
             kept = match &uncertainty.test {
                 Some(test) => format!(
-                    " {} of {} {HELD_OUT} exceed their own bound, where chance explains {}; the \
-                     largest held-out error is {max} mm.",
+                    " {} of {} {HELD_OUT} exceed theirs ({} by chance); the largest error is \
+                     {max} mm.",
                     test.beyond(),
                     test.of,
                     number(test.expected_beyond(), 1)

@@ -130,7 +130,7 @@ fn held_out_rows_are_judged() {
         assert!(rows.len() == 1 && rows[0].row == 77 && wrong.is_trusted(), "{by}: {rows:?}");
         let words = outliers.to_string();
         assert!(
-            words.contains("1 of 30 held-out poses is too far off") && words.len() < 200,
+            words.contains("1 of 30 held-out rows is too far off") && words.len() < 200,
             "{words}"
         );
         let text = estimate_text(&problem, &wrong, None);

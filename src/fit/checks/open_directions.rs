@@ -253,8 +253,7 @@ fn is_fixture(name: &str) -> bool {
     words.iter().any(|word| name.starts_with(word)) && !is_lens(name) && field(name) != "radius"
 }
 
-/// Returns true for a parameter of the lens of a camera, by its name.
-pub(super) fn is_lens(name: &str) -> bool {
+fn is_lens(name: &str) -> bool {
     let of_pose = ["x", "y", "z", "rx", "ry", "rz"];
     name.starts_with("camera[") && !of_pose.contains(&field(name))
 }

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::DVector;
 
 use super::finding::{Finding, FindingCode};
-use super::open_directions::is_lens;
 use crate::fit::Placement;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::count_distinct;
@@ -54,7 +53,11 @@ impl PoseSufficiency {
             observation.coordinates() + if observation.is_position() { turned } else { 0 }
         };
         let of_row: Vec<usize> = (0..measurements.len()).map(of_row).collect();
-        let lens = unknowns.iter().filter(|parameter| is_lens(&parameter.name)).count();
+        let is_lens = |parameter: &&&Parameter| match parameter.site {
+            ParameterSite::Fixture { kind, axis, .. } => kind.word() == "camera" && axis > 5,
+            _ => false,
+        };
+        let lens = unknowns.iter().filter(is_lens).count();
         let coordinates =
             coordinates(fitting, (&numbers, &of_arm), &split.identification, (&of_row, lens));
         let is_open = |parameter: &&&Parameter| {

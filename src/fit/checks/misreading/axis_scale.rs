@@ -3,9 +3,6 @@
 use super::Misreading;
 use super::search::Trial;
 
-/// Trial ratios of one coordinate to the two others, in millionths.
-pub(super) const TRIAL_RATIOS: [u32; 8] =
-    [800_000, 900_000, 950_000, 980_000, 1_020_000, 1_050_000, 1_100_000, 1_250_000];
 /// Distances of the two trial ratios beside a ratio from it, relative to it: twice with the
 /// registered nominal arm, then with full fits.
 const STEPS: [(f64, bool); 3] = [(0.01, false), (0.002, false), (0.001, true)];

@@ -2,13 +2,15 @@
 
 use std::f64::consts::PI;
 
-use super::axis_scale::TRIAL_RATIOS;
 use super::commands::{TURN_UNITS, of_commands, of_mixed_units, turns_in};
 use super::{MassScale, Misreading, POSITION_UNITS};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Joint, JointKind, Problem};
 
+/// Trial ratios of one coordinate of the positions to the two others, in millionths.
+const TRIAL_RATIOS: [u32; 8] =
+    [800_000, 900_000, 950_000, 980_000, 1_020_000, 1_050_000, 1_100_000, 1_250_000];
 /// Smallest absolute angle of the joint table, as a number of degrees, that may be meant in
 /// radians.
 const MIN_RADIANS: f64 = 0.3;
@@ -60,7 +62,9 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(of_slides(problem, table));
     units.extend(lengths(false).then_some(Misreading::Metres));
     units.extend(lengths(true).then_some(Misreading::Millimetres));
-    let others = (0..POSITION_UNITS.len()).filter(|_| lengths(false));
+    // Where the declared unit is not known, micrometres are millimetres taken for metres.
+    let is_other = |unit: &usize| !lengths(true) || POSITION_UNITS[*unit].1 != "micrometres";
+    let others = (0..POSITION_UNITS.len()).filter(|_| lengths(false)).filter(is_other);
     units.extend(others.map(|unit| Misreading::PositionUnit { unit }));
     let powers = if lengths(false) { [3, 1] } else { [-3, -2] };
     let of_axis = |axis: usize| powers.map(|power| Misreading::AxisUnit { axis, power });
