@@ -115,7 +115,7 @@ fn units_and_scales_of_positions_are_named() {
     let mistakes: [(Mistake, &str); 3] = [
         (|at| *at *= 1e3, "positions that are micrometres, declared as millimetres"),
         (|at| *at /= 304.8, "positions that are feet, declared as millimetres"),
-        (|at| at.y *= 1.053, "y of the positions that is 1.0530 times as large as it should be"),
+        (|at| at.y *= 1.053, "y of the positions that is 1.05"),
     ];
     for (mistake, expected) in mistakes {
         let mut data = clean.clone();
