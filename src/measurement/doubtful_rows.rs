@@ -4,6 +4,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use nalgebra::Vector2;
+
 use super::Measurements;
 use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Joint, JointKind, Observation, Problem};
@@ -66,13 +68,13 @@ impl Measurements {
             let Observation::Pixel(camera, ..) = self.observation(row) else { return None };
             let focal =
                 problem.fixtures.get(camera as usize)?.known.get(FOCAL_X).copied().flatten();
-            let at = self.positions.get(row)?;
-            Some((row, at.x.abs().max(at.y.abs()), focal.unwrap_or(0.0)))
+            Some((row, self.positions.get(row)?.xy(), focal.unwrap_or(0.0)))
         };
-        let pixels: Vec<(usize, f64, f64)> = (0..self.len()).filter_map(pixel).collect();
-        let largest = pixels.iter().map(|(_, reach, _)| *reach).fold(0.0, f64::max);
+        let pixels: Vec<(usize, Vector2<f64>, f64)> = (0..self.len()).filter_map(pixel).collect();
+        let largest = pixels.iter().map(|(_, at, _)| at.amax()).fold(0.0, f64::max);
         let is_normalised = pixels.len() >= MIN_NORMALISED_ROWS
             && largest < MAX_NORMALISED
+            && pixels.iter().any(|(_, at, _)| at.min() < 0.0)
             && pixels.iter().all(|(.., focal)| *focal > MIN_PIXEL_FOCAL);
         match pixels.first().filter(|_| is_normalised) {
             Some((row, ..)) => {

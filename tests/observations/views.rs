@@ -66,7 +66,10 @@ fn a_lens_is_contradicted_only_if_it_is_wrong() {
         let (said, is_within) = bench.lens_finding(from, to, seed as u64);
         println!("{to}: {said:?}, within chance: {is_within}");
         let said = said.unwrap();
-        assert!(names.iter().any(|name| said.contains(&format!("camera[hand].{name}"))), "{said}");
+        let is_named = |name: &&str| said.contains(&format!("camera[hand].{name}"));
+        // The true lens has no distortion, which is the reading of undistorted pixels.
+        let is_read = from == lens && said.contains("with distortion = [0, 0, 0, 0, 0]");
+        assert!(is_read || names.iter().any(is_named), "{said}");
         within += usize::from(is_within);
     }
     assert!(within > 0);
