@@ -193,16 +193,13 @@ pub fn close_by(
         conclusion =
             conclude(&state, &declared, (declared.clone(), of_declared), interrupted, |_| true);
     }
+    let (conclusion, with_found) =
+        with_found_alone(&state, &declared, conclusion, (interrupted, &unstoppable))?;
     let Conclusion { fitted, evidence, residual_tests, effects, mut unexplained } = conclusion;
     if unexplained.is_empty() {
         unexplained.extend(unexplained::unlocated(&residual_tests));
     }
     let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
-    let with_found = if statuses.iter().all(|status| *status == Status::Found) {
-        None
-    } else {
-        Some(fit_with_found(&state, &fitted, &effects, &unstoppable)?)
-    };
     let contradicted = [FindingCode::HeldOutBeyondPrediction, FindingCode::RowsSetAside];
     let is_noise =
         unexplained.is_empty() && !contradicted.iter().any(|code| fitted.found.has(*code));
@@ -318,6 +315,35 @@ fn conclude(
         is_used,
     );
     Conclusion { fitted, evidence, residual_tests, effects, unexplained }
+}
+
+/// Fits the problem with those effects of a conclusion alone that are found, if there are others.
+///
+/// If that fit, or the whole one, shows that the intrinsics of a camera are wrong, the effects may
+/// only imitate them: the conclusion is then drawn again as of a fit that is not to be trusted.
+fn with_found_alone(
+    state: &SearchState,
+    declared: &Fitted,
+    conclusion: Conclusion,
+    (interrupted, options): (bool, &Options),
+) -> Result<(Conclusion, Option<Fitted>), IdentifyError> {
+    let fit = |Conclusion { fitted, effects, .. }: &Conclusion| {
+        let are_all = effects.iter().all(|found| found.status == Status::Found);
+        (!are_all).then(|| fit_with_found(state, fitted, effects, options)).transpose()
+    };
+    let with_found = fit(&conclusion)?;
+    let of = &with_found.as_ref().unwrap_or(&conclusion.fitted).found;
+    let lens = of.finding(FindingCode::LensContradicted).cloned();
+    let Some(lens) = lens.filter(|_| declared.found.describes_arm()) else {
+        return Ok((conclusion, with_found));
+    };
+    let Conclusion { mut fitted, evidence, .. } = conclusion;
+    if !fitted.found.has(FindingCode::LensContradicted) {
+        fitted.found.findings.insert(0, lens);
+    }
+    let conclusion = conclude(state, declared, (fitted, evidence), interrupted, |_| true);
+    let with_found = fit(&conclusion)?;
+    Ok((conclusion, with_found))
 }
 
 /// Returns the fit with which the loop ends: that of the search, or the declared one if it predicts
