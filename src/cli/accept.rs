@@ -125,7 +125,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let next = if !found.is_trusted() {
             format!("flexcal identify {} says what to correct", common.problem_arguments())
         } else if judged.are_poses_fitted {
-            "hold out poses that are not fitted, as held_out = { fraction = 0.3, seed = 1 } does, then the same command again"
+            "hold out poses that are not fitted, as held_out = { fraction = 0.3, seed = 1 } does, \
+             then the same command again"
                 .to_owned()
         } else if arguments.tolerance_mm.is_some_and(is_tiny) {
             "give --tolerance-mm in millimetres, as the warning says".to_owned()

@@ -92,14 +92,16 @@ pub fn after_fit(
             .is_some_and(|misread| misread.remedy != FindingCode::Misread.entry().remedy) =>
         {
             format!(
-                "check what the warning names, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
+                "check what the warning names, then flexcal identify {named}; if the input is \
+                 right, flexcal loop {named} looks for what the model lacks"
             )
         }
         None if found.has(FindingCode::Misread) => format!(
             "correct the table or {file} as the warning says, then flexcal identify {named}"
         ),
         None if found.has(FindingCode::LensContradicted) => format!(
-            "correct or free the intrinsics in {file} as the warning says, then flexcal identify {named}"
+            "correct or free the intrinsics in {file} as the warning says, then flexcal identify \
+             {named}"
         ),
         None if holds_a_wrong_fixture(found) => {
             format!(
@@ -117,19 +119,15 @@ pub fn after_fit(
         None if found.has(FindingCode::PriorContradicted)
             && !found.has(FindingCode::NominalFarOff) =>
         {
-            let rule = found
-                .finding(FindingCode::PriorContradicted)
-                .and_then(|finding| finding.word("rule"));
-            let rule = rule.unwrap_or_default();
-            format!(
-                "give \"{rule}\" in {file} a larger σ, or check the nominal values of these parameters and their units"
-            )
+            widen_prior(found, &file)
         }
         None if INPUT_MISTAKES.iter().any(|code| found.has(*code)) => format!(
-            "correct the table or {file} as the warning says, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
+            "correct the table or {file} as the warning says, then flexcal identify {named}; if \
+             the input is right, flexcal loop {named} looks for what the model lacks"
         ),
         None if found.has(FindingCode::PayloadAtTarget) => format!(
-            "declare the place of the payload in {file} as the warning says, then flexcal identify {named}"
+            "declare the place of the payload in {file} as the warning says, then flexcal \
+             identify {named}"
         ),
         None if found.has(FindingCode::StrategyMisfit)
             || found.has(FindingCode::NoiseBeyondDeclared) =>
@@ -173,6 +171,16 @@ pub fn after_fit(
     }
 }
 
+/// States what to do about a prior that contradicts the data.
+fn widen_prior(found: &Identification, file: &str) -> String {
+    let contradicted = found.finding(FindingCode::PriorContradicted);
+    let rule = contradicted.and_then(|finding| finding.word("rule")).unwrap_or_default();
+    format!(
+        "give \"{rule}\" in {file} a larger σ, or check the nominal values of these parameters and \
+         their units"
+    )
+}
+
 /// Returns true if a held number of a point, an anchor or a surface causes the misfit.
 fn holds_a_wrong_fixture(found: &Identification) -> bool {
     let held = found.finding(FindingCode::HeldParameter);
@@ -204,7 +212,8 @@ pub fn after_loop(
     }
     if result.structures().any(|left| left.limit.is_some()) {
         return format!(
-            "flexcal identify {named} -v shows how far the error would fall if a limit moved out; widen those that may be wrong"
+            "flexcal identify {named} -v shows how far the error would fall if a limit moved out; \
+             widen those that may be wrong"
         );
     }
     // A plan can distinguish two effects if the ranges of the poses are known, and if the effects
@@ -227,7 +236,8 @@ pub fn after_loop(
     });
     if let Some(decided) = undecided {
         return format!(
-            "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {decided}"
+            "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, \
+             {decided}"
         );
     }
     if let Some(([effect, rival], (poses, is_enough))) = pairs.find(can_be_planned) {
@@ -250,7 +260,8 @@ pub fn after_loop(
             "flexcal plan {named}{data} --poses {poses} --separate '{effect}' '{rival}' {choice}"
         );
         return format!(
-            "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {plan}"
+            "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, \
+             {plan}"
         );
     }
     match result.verdict {
@@ -259,7 +270,8 @@ pub fn after_loop(
         }
         Verdict::Unexplained => {
             let trace = format!(
-                "flexcal trace {named} ranks candidates and lists effects that these data cannot show, if there are any"
+                "flexcal trace {named} ranks candidates and lists effects that these data cannot \
+                 show, if there are any"
             );
             let is_better = !result.effects.is_empty() || result.remainder.is_some();
             if is_better {

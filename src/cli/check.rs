@@ -114,7 +114,8 @@ fn slides_along_gravity(problem: &Problem) -> Option<&'static str> {
     let across = problem.gravity.cross(&Vector3::new(0.0, -sin, cos)).norm();
     let is_along = across < MAX_PARALLEL_SINE * problem.gravity.norm();
     (is_along && problem.joints.iter().any(has_masses)).then_some(
-        "gravity acts along the axis on which joint 1 slides: right for a lift; on a level rail, write gravity_m_s2 as the base frame sees it",
+        "gravity acts along the axis on which joint 1 slides: right for a lift; on a level rail, \
+         write gravity_m_s2 as the base frame sees it",
     )
 }
 

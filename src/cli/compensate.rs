@@ -120,7 +120,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.warn_of_loads(&problem, &estimate, &targets);
     if !trusted {
         diagnostic::warn(
-            "the estimate is not to be trusted, so the commands are not either: do not move the arm by them",
+            "the estimate is not to be trusted, so the commands are not either: do not move the \
+             arm by them",
         );
     }
     let correction = remainder::of_estimate(&problem, &estimate);

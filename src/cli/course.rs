@@ -148,7 +148,8 @@ impl fmt::Display for Course {
         let Step { iteration, unknowns, poses, cost, left, .. } = step;
         write!(
             f,
-            "{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}"
+            "{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares \
+             {cost:.6e}"
         )?;
         write_remaining(f, left.filter(|_| self.round.is_none()), "fit")
     }

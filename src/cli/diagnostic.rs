@@ -63,7 +63,8 @@ fn with_argument(error: &InputError) -> Option<String> {
 fn by_arguments(error: &DesignError) -> Option<String> {
     match error {
         DesignError::NoRange(_) => Some(format!(
-            "{error}, or name a TRUTH.toml with --truth whose [poses] say where to draw, or a table of poses with --candidates"
+            "{error}, or name a TRUTH.toml with --truth whose [poses] say where to draw, or a \
+             table of poses with --candidates"
         )),
         DesignError::TooFewCandidates { poses, candidates } => {
             Some(format!("--poses {poses}: there are only {candidates} candidates"))

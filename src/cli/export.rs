@@ -212,7 +212,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }));
     let judged = data.as_ref().filter(|data| geometry.can_be_judged(data));
     flags.hint((data.is_some() && judged.is_none()).then_some(
-        "no errors are computed, because the measurements do not judge the geometry of --best-rigid: some rows measure no position",
+        "no errors are computed, because the measurements do not judge the geometry of \
+         --best-rigid: some rows measure no position",
     ));
     let errors = match judged {
         Some(data) => {

@@ -34,7 +34,8 @@ pub struct Common {
 /// Error that joint tables are given for a problem that does not join any.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "--joints: {} joins no joint table; write joints = {{ files = [\"controller.csv\"], by = \"time\" }} in [data]",
+    "--joints: {} joins no joint table; write joints = \
+     {{ files = [\"controller.csv\"], by = \"time\" }} in [data]",
     file.display()
 )]
 struct NothingToJoin {
@@ -129,7 +130,8 @@ impl Common {
         if let Some(log) = kept.filter(|_| are_others) {
             self.hint(log.files.first().map(|file| {
                 format!(
-                    "the joint table is still {}, which joints in [data] names; --joints FILE gives that of these measurements",
+                    "the joint table is still {}, which joints in [data] names; --joints FILE \
+                     gives that of these measurements",
                     file.display()
                 )
             }));
@@ -201,7 +203,8 @@ impl Common {
     /// they are, or if it has none.
     pub fn orientation_line(problem: &Problem, rows: &Measurements) -> &'static str {
         if rows.orientations.is_some() && !problem.data.fits_orientation {
-            "\nThe orientations in the table are not fitted: orientation_sigma_deg in [data], their 1 σ, fits them.\n"
+            "\nThe orientations in the table are not fitted: orientation_sigma_deg in [data], \
+             their 1 σ, fits them.\n"
         } else {
             ""
         }

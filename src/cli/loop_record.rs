@@ -107,7 +107,8 @@ impl LoopRecord {
         match self.write_closed_problem(&added) {
             Ok(file) => {
                 diagnostic::warn(&format!(
-                    "interrupted: {} declares the effects of the finished rounds; flexcal loop {} searches on",
+                    "interrupted: {} declares the effects of the finished rounds; flexcal loop {} \
+                     searches on",
                     file.display(),
                     shell_word(&file)
                 ));

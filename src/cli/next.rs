@@ -27,7 +27,8 @@ use super::{diagnostic, interrupt, values};
 #[derive(Debug, Args)]
 #[command(
     mut_arg("candidates", |arg| arg.long("pool").alias("candidates").help(
-        "Tables of poses to choose from, with the columns of measurements; positions are not needed. Predictions are judged there"
+        "Tables of poses to choose from, with the columns of measurements; positions are not \
+         needed. Predictions are judged there"
     )),
     after_help = "Fits the measured poses, then chooses those that lower the error of predictions in the workspace most: the limits of the \
 joints (measured ranges where there are none), the ranges of a TRUTH.toml, or the rows of --pool. Writes next.json, the page next.html and, unless nothing more is needed, next.csv. Exit \
@@ -263,7 +264,8 @@ fn next_step(
             );
         }
         format!(
-            "flexcal loop {arguments} looks for what the model lacks, because the misfit exceeds the noise; or "
+            "flexcal loop {arguments} looks for what the model lacks, because the misfit exceeds \
+             the noise; or "
         )
     } else if next.is_out_of_reach(tolerance) && !next.poses.is_empty() {
         "choose another --tolerance-mm or a better instrument; to lower the error all the same, "

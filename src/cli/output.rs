@@ -21,7 +21,8 @@ pub enum WriteError {
     #[error("cannot write {}: {source}", path.display())]
     Io { path: PathBuf, source: io::Error },
     #[error(
-        "{}: another flexcal has been writing there for {} s; wait for its end, or name another folder with --out",
+        "{}: another flexcal has been writing there for {} s; wait for its end, or name another \
+         folder with --out",
         folder.display(),
         MAX_LOCK_WAIT.as_secs()
     )]
@@ -29,7 +30,8 @@ pub enum WriteError {
     #[error("cannot write {}: {why}", path.display())]
     InTheWay { path: PathBuf, why: &'static str },
     #[error(
-        "{} is an input of this command or belongs to its problem; name another place with --out, or overwrite it with --force",
+        "{} is an input of this command or belongs to its problem; name another place with --out, \
+         or overwrite it with --force",
         path.display()
     )]
     Input { path: PathBuf },

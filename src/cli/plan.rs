@@ -66,7 +66,8 @@ const CRITERIA: [(&str, &str, Criterion); 5] = [
     ),
     (
         "I",
-        "The mean variance of predicted positions in the ranges, with a misfit as large as the noise",
+        "The mean variance of predicted positions in the ranges, with a misfit as large as the \
+         noise",
         Criterion::I,
     ),
 ];

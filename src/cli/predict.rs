@@ -139,7 +139,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let next = match (&arguments.estimate, &estimate) {
             _ if let Some(&first) = lost.first() => format!(
-                "correct the loads (payload_kg, hoist_N) of {} without equilibrium, the first at {}, then the same command",
+                "correct the loads (payload_kg, hoist_N) of {} without equilibrium, the first at \
+                 {}, then the same command",
                 if lost.len() == 1 { "1 row".to_owned() } else { format!("{} rows", lost.len()) },
                 rows.location(first)
             ),
@@ -147,7 +148,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 "correct the table as the warning says, then the same command".to_owned()
             }
             (Some(file), _) if fitted.is_empty() && test.is_some_and(|of| of.is_contradicted()) => format!(
-                "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than foreseen lie within their bounds",
+                "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than \
+                 foreseen lie within their bounds",
                 common.problem_arguments(),
                 shell_word(file)
             ),

@@ -15,7 +15,8 @@ const MAX_THREADS: usize = 256;
 /// Error for a number of threads that is not valid.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{VARIABLE}={text}: a whole number from 0 (as many as processors) to {max} is needed; correct it or unset it"
+    "{VARIABLE}={text}: a whole number from 0 (as many as processors) to {max} is needed; correct \
+     it or unset it"
 )]
 pub struct BadThreads {
     text: String,
@@ -25,7 +26,8 @@ pub struct BadThreads {
 /// Error for threads that the system does not start.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "no threads for the computation: {reason}; raise the limits of processes and memory (ulimit -u, -v), or set {VARIABLE}=1"
+    "no threads for the computation: {reason}; raise the limits of processes and memory (ulimit \
+     -u, -v), or set {VARIABLE}=1"
 )]
 pub struct NoThreads {
     reason: io::Error,

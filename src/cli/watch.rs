@@ -138,7 +138,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 common.problem_arguments()
             )
         } else if watch.is_changed() && first == Some(CauseKind::Noise) {
-            "measure a few of these poses again. If watch.html shows the evidence rise from some row on, give the rows from there on alone"
+            "measure a few of these poses again. If watch.html shows the evidence rise from some \
+             row on, give the rows from there on alone"
                 .to_owned()
         } else if watch.is_changed() && first == Some(CauseKind::Row) {
             format!("check that row, then flexcal watch {} --estimate {file} without it", common.problem_arguments())
@@ -154,7 +155,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             }
         } else if watch.has_drifted() {
             format!(
-                "{} takes the drift over into an estimate, because the old one errs by more than its bounds say",
+                "{} takes the drift over into an estimate, because the old one errs by more than \
+                 its bounds say",
                 update()
             )
         } else if !unknown.is_empty() {

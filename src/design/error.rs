@@ -51,7 +51,8 @@ pub enum DesignError {
     },
     /// The nominal arm has no equilibrium in any pose.
     #[error(
-        "the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses"
+        "the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and \
+         masses"
     )]
     NoEquilibrium,
     /// The target of the nominal arm is in no candidate inside the region.
@@ -62,7 +63,8 @@ pub enum DesignError {
     },
     /// No candidate shows a point of a marker to a camera.
     #[error(
-        "no candidate shows a point of a marker to a camera; widen the ranges of the joints, or check where cameras and markers are"
+        "no candidate shows a point of a marker to a camera; widen the ranges of the joints, or \
+         check where cameras and markers are"
     )]
     NothingInView,
     /// The criterion weighs predicted positions, but cameras measure.

@@ -26,7 +26,8 @@ fn remedy(location: &Location, kind: &InputErrorKind) -> &'static str {
             "; fixed = true holds a parameter"
         }
         InputErrorKind::NotPositive { .. } if section == "parameters" => {
-            "; relative is a multiple of the nominal value, such as 0.8 for one that is 20 % smaller"
+            "; relative is a multiple of the nominal value, such as 0.8 for one that is 20 % \
+             smaller"
         }
         InputErrorKind::NotPositive { .. }
             if section == "data" && name.starts_with("position_sigma") =>

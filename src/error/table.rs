@@ -41,7 +41,8 @@ pub enum TableErrorKind {
         if offset.is_some() {
             clock_offset_remedy(offset.as_deref())
         } else {
-            "; check the column of the join (pose or time), whether both clocks agree, and tolerance_s"
+            "; check the column of the join (pose or time), whether both clocks agree, and \
+             tolerance_s"
                 .to_owned()
         }
     )]
@@ -141,7 +142,8 @@ pub enum TableErrorKind {
     #[error("a decimal comma needs another delimiter than the comma; write delimiter = \";\"")]
     DecimalDelimiter,
     #[error(
-        "numbers can begin with {mark:?} too, and their rows would be lost; write a mark that no row begins with"
+        "numbers can begin with {mark:?} too, and their rows would be lost; write a mark that no \
+         row begins with"
     )]
     CommentOfNumbers { mark: String },
     #[error(

@@ -59,7 +59,8 @@ pub enum WarningKind {
     )]
     PositionZero { write: String },
     #[error(
-        "{value} px is outside the image of the camera \"{camera}\", image_px = [{}, {}]; correct image_px, which plans and exports use{}",
+        "{value} px is outside the image of the camera \"{camera}\", image_px = [{}, {}]; correct \
+         image_px, which plans and exports use{}",
         image[0], image[1], more_rows(*rows)
     )]
     OutsideImage { value: String, camera: String, image: [String; 2], rows: usize },
@@ -285,7 +286,8 @@ pub enum WarningKind {
     )]
     SigmaUnused { write: String },
     #[error(
-        "{term:?} multiplies an angle by {factor} in a function of angles; q1, q2, … are in radians already"
+        "{term:?} multiplies an angle by {factor} in a function of angles; q1, q2, … are in \
+         radians already"
     )]
     AngleConverted { term: String, factor: String },
     #[error(
@@ -315,7 +317,8 @@ pub enum WarningKind {
     )]
     ConstantTemperature { value: String },
     #[error(
-        "[{}, {}] is far from the middle of image_px = [{}, {}], and near it if exchanged: write [{}, {}]",
+        "[{}, {}] is far from the middle of image_px = [{}, {}], and near it if exchanged: write \
+         [{}, {}]",
         centre[0], centre[1], image[0], image[1], centre[1], centre[0]
     )]
     CentreExchanged { centre: [String; 2], image: [String; 2] },

@@ -58,7 +58,8 @@ pub fn camera_yaml(
     let [width, height] = image(fixture)?;
     let Lens { matrix, coefficients, model } = Lens::of(camera);
     let place = format!(
-        "# Pose of the camera (z forward, x right, y down) in {}: position {} m, rotation vector {} rad.\n",
+        "# Pose of the camera (z forward, x right, y down) in {}: position {} m, rotation vector \
+         {} rad.\n",
         carrier_label(problem, fixture),
         list(&camera.numbers[..3]),
         list(&camera.numbers[3..6])

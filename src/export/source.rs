@@ -58,7 +58,8 @@ pub fn sources(
         return Err(ExportError::NotFinite { what, value });
     }
     let about = format!(
-        "/* {}: model of the identified arm, written by flexcal {}.\n   C99; no allocation, no library but libm; double, or float with -DFLEXCAL_FLOAT. */\n",
+        "/* {}: model of the identified arm, written by flexcal {}.\n   C99; no allocation, no \
+         library but libm; double, or float with -DFLEXCAL_FLOAT. */\n",
         plain(&problem.name),
         env!("CARGO_PKG_VERSION")
     );

@@ -38,7 +38,8 @@ pub enum IdentifyError {
     },
     /// A rule of the search for effects has a value outside its range.
     #[error(
-        "the rule {rule} of the search for effects has a value outside its range; docs/selection.md explains it"
+        "the rule {rule} of the search for effects has a value outside its range; \
+         docs/selection.md explains it"
     )]
     Rule {
         /// Name of the rule.

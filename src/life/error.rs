@@ -21,12 +21,14 @@ pub enum PriorError {
     #[error(transparent)]
     Identify(#[from] IdentifyError),
     #[error(
-        "{}: none of its parameters has a variance, so it is no prior; identify the earlier rows again",
+        "{}: none of its parameters has a variance, so it is no prior; identify the earlier rows \
+         again",
         file.display()
     )]
     NoCovariance { file: PathBuf },
     #[error(
-        "{}: was identified with strategy {found}; a prior needs the strategy joint, in the earlier and in the new identification",
+        "{}: was identified with strategy {found}; a prior needs the strategy joint, in the \
+         earlier and in the new identification",
         file.display()
     )]
     Strategy { file: PathBuf, found: &'static str },
@@ -37,12 +39,14 @@ pub enum PriorError {
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable { file: PathBuf, source: std::io::Error },
     #[error(
-        "{}: changed since flexcal wrote it; run flexcal fleet again, or move the file to another folder to use it as it is",
+        "{}: changed since flexcal wrote it; run flexcal fleet again, or move the file to another \
+         folder to use it as it is",
         file.display()
     )]
     Changed { file: PathBuf },
     #[error(
-        "{}: not a PRIOR.toml of flexcal fleet: {reason}; --prior takes that or the estimate.json of flexcal identify",
+        "{}: not a PRIOR.toml of flexcal fleet: {reason}; --prior takes that or the estimate.json \
+         of flexcal identify",
         file.display()
     )]
     Syntax { file: PathBuf, reason: String },
@@ -53,12 +57,14 @@ pub enum PriorError {
     #[error("{}: {name} is part of the prior, but not free in the problem", file.display())]
     NotFree { file: PathBuf, name: String },
     #[error(
-        "{}: the arm it describes has no prediction in some pose of the table; check the loads there, such as payload_kg",
+        "{}: the arm it describes has no prediction in some pose of the table; check the loads \
+         there, such as payload_kg",
         file.display()
     )]
     NotFinite { file: PathBuf },
     #[error(
-        "{}: neither it nor the problem states σ of a measured position; declare position_sigma_mm in [data], or a column sigma_mm",
+        "{}: neither it nor the problem states σ of a measured position; declare \
+         position_sigma_mm in [data], or a column sigma_mm",
         file.display()
     )]
     NoSigma { file: PathBuf },
@@ -68,12 +74,14 @@ pub enum PriorError {
     )]
     SameRows { file: PathBuf, other: PathBuf, rows: usize },
     #[error(
-        "{}: was identified with a prior from siblings, which would count twice; identify its rows without --prior",
+        "{}: was identified with a prior from siblings, which would count twice; identify its \
+         rows without --prior",
         file.display()
     )]
     HasFleetPrior { file: PathBuf },
     #[error(
-        "{}: its fit was not trusted, so it is no prior; see its findings, and identify its rows together with the new ones",
+        "{}: its fit was not trusted, so it is no prior; see its findings, and identify its rows \
+         together with the new ones",
         file.display()
     )]
     Untrusted { file: PathBuf },

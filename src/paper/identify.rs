@@ -51,7 +51,8 @@ pub struct Identified {
 pub enum IdentifyError {
     /// The poses have fewer equations, three each, than eq. 42 has unknowns: 5n, or 4n without β.
     #[error(
-        "identifying {unknowns} geometric parameters takes at least {needed} poses, there are {poses}"
+        "identifying {unknowns} geometric parameters takes at least {needed} poses, there are \
+         {poses}"
     )]
     TooFewPoses {
         /// Number of unknowns of eq. 42.

@@ -104,7 +104,8 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
             "if it is the first [[…]] of this name, a header above it is misspelt, and parts such as [[joint.body]] then began another \
              section; otherwise write its lines into the first section of this name"
         } else if LISTS.iter().any(|list| word.starts_with(list)) {
-            "joints, effects and the like are lists: write two brackets for each of them, as in [[joint]], the first one too"
+            "joints, effects and the like are lists: write two brackets for each of them, as in \
+             [[joint]], the first one too"
         } else {
             "write its lines into the first section of this name"
         };

@@ -53,7 +53,8 @@ pub enum SavedRemainderError {
     #[error("{}: belongs to another estimate than {} ({parameter} differs): one of the two files is of another run; fit both again with flexcal identify --remainder", file.display(), estimate.display())]
     OtherEstimate { file: PathBuf, estimate: PathBuf, parameter: String },
     #[error(
-        "{location}: {source}; fit a remainder with flexcal identify --remainder, or write use = false"
+        "{location}: {source}; fit a remainder with flexcal identify --remainder, or write use = \
+         false"
     )]
     Declared { location: Location, source: Box<SavedRemainderError> },
 }

@@ -24,11 +24,14 @@ pub fn check(problem: &Problem, check: &Check) -> Story {
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "± 1 σ", "unit", "identified"];
     let mut notes = vec![
-        "± 1 σ: expected standard error, root mean square over arms drawn from the priors; identified: share of the information that comes from the data; the rest comes from the prior or the start value",
+        "± 1 σ: expected standard error, root mean square over arms drawn from the priors; \
+         identified: share of the information that comes from the data; the rest comes from the \
+         prior or the start value",
     ];
     if forecast.expected.iter().any(is_confounded_at_nominal) {
         notes.push(
-            "two shares: the first at the nominal arm, where the parameter is confounded with others (below), the second over arms drawn from the priors",
+            "two shares: the first at the nominal arm, where the parameter is confounded with \
+             others (below), the second over arms drawn from the priors",
         );
     }
     let sheet = rows_of_sheet(problem);
@@ -152,7 +155,8 @@ fn prediction_sentences(check: &Check) -> String {
     let Prediction { median, quantile_95, rms } = check.prediction;
     let noise = match check.noise {
         Some(noise) if measures_positions(check) => format!(
-            "One measured position has {} mm of noise (rms), so held-out errors to expect are {} mm (rms).",
+            "One measured position has {} mm of noise (rms), so held-out errors to expect are {} \
+             mm (rms).",
             mm(noise, 3),
             mm(rms.hypot(noise), 3)
         ),
@@ -165,7 +169,8 @@ fn prediction_sentences(check: &Check) -> String {
     };
     let [median, most, rms] = [median, quantile_95, rms].map(|length| mm(length, 3));
     format!(
-        "Expected error of predicted positions {place}: {median} mm (median), {most} mm (95 %), {rms} mm (rms).\n{noise}"
+        "Expected error of predicted positions {place}: {median} mm (median), {most} mm (95 %), \
+         {rms} mm (rms).\n{noise}"
     )
 }
 
@@ -203,14 +208,20 @@ fn growth_table(check: &Check) -> Table {
 fn recommendation(problem: &Problem, check: &Check) -> String {
     match check.growth.enough {
         Some(enough) if enough <= check.forecast.poses => format!(
-            "Enough: {enough} such poses determine every combination of parameters that such poses can determine, and predictions are then as accurate as one measured position. More poses still lower the error (table below)."
+            "Enough: {enough} such poses determine every combination of parameters that such \
+             poses can determine, and predictions are then as accurate as one measured position. \
+             More poses still lower the error (table below)."
         ),
         Some(enough) if let Some(measured) = poses_to_measure(problem, enough) => format!(
-            "Measure {measured} poses, of which held_out removes {}: the others determine every combination of parameters that such poses can determine, and predictions are then as accurate as one measured position. More poses still lower the error (table below).",
+            "Measure {measured} poses, of which held_out removes {}: the others determine every \
+             combination of parameters that such poses can determine, and predictions are then as \
+             accurate as one measured position. More poses still lower the error (table below).",
             measured - enough
         ),
         Some(enough) => format!(
-            "Measure {enough} poses: they determine every combination of parameters that such poses can determine, and predictions are then as accurate as one measured position. More poses still lower the error (table below)."
+            "Measure {enough} poses: they determine every combination of parameters that such \
+             poses can determine, and predictions are then as accurate as one measured position. \
+             More poses still lower the error (table below)."
         ),
         None if check.noise.is_none() => {
             "No number of poses is recommended, because nothing measured is a length.".to_owned()

@@ -58,7 +58,8 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     if !if_timed.is_empty() {
         let list = effect::listed(if_timed).join("; ");
         blocks.push(Block::Text(format!(
-            "These effects can be seen only if the table records {} (the figures assume about one minute between poses): {list}.",
+            "These effects can be seen only if the table records {} (the figures assume about one \
+             minute between poses): {list}.",
             code("time_s")
         )));
     }
@@ -70,7 +71,8 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
             }
         }
         blocks.push(Block::Text(format!(
-            "No size is stated for effects with a time or a time constant, because the table has no {}: {}. Drifts are per row.",
+            "No size is stated for effects with a time or a time constant, because the table has \
+             no {}: {}. Drifts are per row.",
             code("time_s"),
             names.join(", ")
         )));
@@ -80,7 +82,8 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
         let loaded = hidden.iter().filter(|effect| acts_by_load(effect));
         let list = effect::listed(loaded.map(|effect| &effect.effect)).join("; ");
         blocks.push(Block::Text(format!(
-            "Not visible, because no mass is declared, so no load acts: {list}. Give the links {} and {} in {}.",
+            "Not visible, because no mass is declared, so no load acts: {list}. Give the links {} \
+             and {} in {}.",
             code("mass_kg"),
             code("com_m"),
             code("[[joint.body]]")

@@ -353,7 +353,8 @@ fn held_out_sentence(sides: &[Side; 2]) -> Option<String> {
     };
     let [value, low, high] = [value, low, high].map(|length| number(length, 4));
     Some(format!(
-        "On the {rows} rows that both predict and neither fitted: {verdict} (mean error of B minus A {value} mm, {low} to {high} mm, {} %).",
+        "On the {rows} rows that both predict and neither fitted: {verdict} (mean error of B \
+         minus A {value} mm, {low} to {high} mm, {} %).",
         number(100.0 * INTERVAL_LEVEL, 0)
     ))
 }

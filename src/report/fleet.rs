@@ -34,9 +34,9 @@ pub(crate) fn fleet(fleet: &Fleet) -> Story {
     }
     let parameters = fleet.parameters.iter().map(parameter).collect();
     let arms = fleet.arms.iter().map(arm).collect();
-    let notes = [
-        "deviations from nominal; spread: 1 σ of the next arm about the mean; data sheet: declared 1 σ",
-    ];
+    let notes =
+        ["deviations from nominal; spread: 1 σ of the next arm about the mean; data sheet: \
+         declared 1 σ"];
     let blocks = vec![
         Block::lines(head),
         Block::figures([draw_arms(fleet), draw_parameters(fleet)]),

@@ -79,7 +79,8 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
         let ([mean, rms, _], unit) = found.held_out_after.norms();
         let _ = write!(
             chance,
-            "; held-out error of the first model with it whose effects all stayed: mean {} {unit}, rms {} {unit}",
+            "; held-out error of the first model with it whose effects all stayed: mean {} \
+             {unit}, rms {} {unit}",
             number(mean, 4),
             number(rms, 4)
         );

@@ -267,7 +267,8 @@ fn at_points(held_out: &ErrorSummary) -> Option<String> {
     }
     let [mean, max, rms] = at_point.map(|sizes| number(sizes.norm * 1e3, 4));
     Some(format!(
-        "Held-out image errors correspond to {mean} mm (mean), {rms} mm (rms), {max} mm (max) at the observed points."
+        "Held-out image errors correspond to {mean} mm (mean), {rms} mm (rms), {max} mm (max) at \
+         the observed points."
     ))
 }
 
@@ -355,7 +356,8 @@ pub fn joint_sources_text(sources: &JointSources) -> String {
         format!("write joints = \"{}\" in [data]", better.as_str())
     };
     format!(
-        "Residual of the fitted rows: {} mm rms with joint commands, {} mm with joint readings. The {} coordinates fit better: {advice}.",
+        "Residual of the fitted rows: {} mm rms with joint commands, {} mm with joint readings. \
+         The {} coordinates fit better: {advice}.",
         mm(commanded, 4),
         mm(read, 4),
         better.as_str(),

@@ -72,7 +72,8 @@ fn error_paragraph(next: &NextPoses, percent: &str) -> String {
             mm(error.bound, 3),
             next.attainable
                 .map(|least| format!(
-                    " As far as these rows tell, further poses alone bring the rms to about {} mm at best, and the bound to about {} mm.",
+                    " As far as these rows tell, further poses alone bring the rms to about {} mm \
+                     at best, and the bound to about {} mm.",
                     mm(least, 3),
                     mm(attainable_bound(&error), 3)
                 ))
@@ -212,7 +213,8 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
             "These are all poses of the pool that are not measured.".to_owned()
         }
         (_, Some(tolerance), Some(poses)) => format!(
-            "Not yet enough: after {} the bound is expected to be below the tolerance of {tolerance} mm.",
+            "Not yet enough: after {} the bound is expected to be below the tolerance of \
+             {tolerance} mm.",
             counted(poses, "more pose")
         ),
         (_, Some(tolerance), None) if next.is_out_of_reach(options.tolerance) => format!(
@@ -227,7 +229,8 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
             lacking(next, options)
         ),
         (_, Some(tolerance), None) if !next.steps.is_empty() && next.error.is_some() => format!(
-            "Not yet enough: after these poses the bound is still expected to be above the tolerance of {tolerance} mm."
+            "Not yet enough: after these poses the bound is still expected to be above the \
+             tolerance of {tolerance} mm."
         ),
         _ if next.is_of_cameras => "Further poses lower the variance of predictions as the table says; the error itself is not judged."
             .to_owned(),
@@ -296,10 +299,12 @@ fn step_table(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
         Purpose::Both => "sum of the variances of predictions and effects",
     };
     let note = format!(
-        "travel: largest move of a joint from the pose before, share of its range; gain: by how much the pose lowers the {goal}, in % of the present one"
+        "travel: largest move of a joint from the pose before, share of its range; gain: by how \
+         much the pose lowers the {goal}, in % of the present one"
     );
     let errors = format!(
-        "; rms, bound ({percent} %): expected error in the workspace after the pose, with noise and the misfit that no pose lowers"
+        "; rms, bound ({percent} %): expected error in the workspace after the pose, with noise \
+         and the misfit that no pose lowers"
     );
     let note = if is_judged { note + &errors } else { note };
     Table::new(header, rows.collect(), &[]).noted(&[&note])

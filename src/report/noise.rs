@@ -355,7 +355,8 @@ fn uncertainty(found: &Identification) -> Option<String> {
     let ratio = held_out.rms.norm / fitted.rms.norm;
     (ratio.is_finite() && ratio > UNCERTAIN_RATIO).then(|| {
         format!(
-            "held-out {}s miss by {ratio:.0} times as much as fitted ones, so more poses are needed",
+            "held-out {}s miss by {ratio:.0} times as much as fitted ones, so more poses are \
+             needed",
             row_noun(found)
         )
     })

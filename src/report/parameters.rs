@@ -134,7 +134,8 @@ fn suggested_prior_sigmas(sizes: &[PriorSize]) -> Option<String> {
     let rules: Vec<String> = sizes.iter().map(rule).collect();
     (!rules.is_empty()).then(|| {
         format!(
-            "priors: the estimated deviations suggest other values of σ: {}; with few poses, priors of this size may predict better",
+            "priors: the estimated deviations suggest other values of σ: {}; with few poses, \
+             priors of this size may predict better",
             rules.join(", ")
         )
     })
@@ -332,7 +333,8 @@ pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> 
         }
         [] => "No two other parameters are correlated by more than 0.9.",
         _ => {
-            "Correlated by more than 0.9 (the data determine their sum or difference better than each):"
+            "Correlated by more than 0.9 (the data determine their sum or difference better than \
+             each):"
         }
     };
     Block::Lines(words.to_owned(), points)
@@ -346,7 +348,8 @@ pub(super) fn conditioning<'a>(
 ) -> Block<'a> {
     let [o1, o2, o3, o4, o5] = found.observability(coordinates);
     Block::lines(format!(
-        "At the nominal arm: rank {} of {unknowns}, condition number {:.3e}; observability O1 {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}",
+        "At the nominal arm: rank {} of {unknowns}, condition number {:.3e}; observability O1 \
+         {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}",
         found.rank,
         found.condition_number(),
     ))

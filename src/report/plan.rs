@@ -66,7 +66,9 @@ pub fn plan(
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "random", "planned", "gain", "unit"];
     let note = format!(
-        "planned: expected standard error (1 σ) of the nominal arm (that of flexcal check is a root mean square over arms drawn from the priors); random: the same after random poses, median of {} draws; gain: random / planned",
+        "planned: expected standard error (1 σ) of the nominal arm (that of flexcal check is a \
+         root mean square over arms drawn from the priors); random: the same after random poses, \
+         median of {} draws; gain: random / planned",
         plan.random.len()
     );
     let meaningful = plan.meaningful();

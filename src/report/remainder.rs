@@ -231,7 +231,8 @@ impl PredictionAccuracy {
         let contradicted = uncertainty.test.filter(BoundTest::is_contradicted);
         let bound = (mean.is_finite() && found.is_trusted()).then(|| {
             format!(
-                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the measured joint ranges{far}.{kept}",
+                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} \
+                 mm, mean over the measured joint ranges{far}.{kept}",
                 two_digits(mean * 1e3, 4)
             )
         });

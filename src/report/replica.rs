@@ -137,7 +137,8 @@ fn readings_table(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let header = ["as printed", "where", "moves, mm", known, declared, positions, differences];
     Table::new(&header, rows, &[0, 1]).noted(&[
         "moves: largest change of the end point at the errors of the truth, on the arm as declared",
-        "± standard deviation over specimens; links and joints share their flexibility as declared; diverges: eq. 45 does not converge",
+        "± standard deviation over specimens; links and joints share their flexibility as \
+         declared; diverges: eq. 45 does not converge",
     ])
 }
 
@@ -173,7 +174,8 @@ fn comparison_table(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     ];
     let header = ["held out, mm", "mean", "max", "mean |z|", "paper: mean", "max", "mean |z|"];
     Table::new(&header, rows, &[0]).noted(&[
-        "elasticity considered: here misprints corrected and stiffness known; geometry-only: stiffness as declared",
+        "elasticity considered: here misprints corrected and stiffness known; geometry-only: \
+         stiffness as declared",
     ])
 }
 
@@ -219,6 +221,7 @@ fn ratio_table(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     Table::new(&header, rows, &[0, 1]).noted(&[
         "links, one load: ratio of the mean errors; links: link to joint flexibility, relative to the declared ratio; one load: all \
          poses under one load",
-        "z/sum: share of the error along z; max/max: ratio of the largest errors; both of the first case",
+        "z/sum: share of the error along z; max/max: ratio of the largest errors; both of the \
+         first case",
     ])
 }

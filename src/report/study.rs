@@ -61,7 +61,8 @@ pub fn study(study: &Study, results: &Results) -> Story {
          leave them out; held out: measured − predicted, noise included; covered: \
          share of estimates within 1.96 standard errors of the truth, 95 % if the standard \
          errors are right;",
-        "largest bias: largest ratio of bias to standard deviation of the errors, over all parameters, those that stay nominal included; ms: median time of a fit",
+        "largest bias: largest ratio of bias to standard deviation of the errors, over all \
+         parameters, those that stay nominal included; ms: median time of a fit",
     ]);
     let [titled, untitled] = opening(&study.title, head);
     let conclusion = Block::lines(conclusion(&cells));

@@ -214,7 +214,8 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     let first = &result.explanations[0];
     if !result.claims.is_empty() && std::ptr::eq(groups[0][0], first) {
         blocks.push(Block::heading(
-            "How sure the most probable explanation is: where it acts, what it depends on, and its law",
+            "How sure the most probable explanation is: where it acts, what it depends on, and \
+             its law",
         ));
         let words = |claims: &Claims| {
             let mut others = first.hypotheses.iter().filter(|other| other.effect.is_none());
@@ -398,13 +399,15 @@ pub(super) fn undetectable_effects<'a>(problem: &Problem, trace: &Trace) -> Vec<
         .partition(|of| has_no_mass(problem) && of.has_need(&[Need::Loads, Need::Play]));
     if !unloaded.is_empty() {
         blocks.push(Block::heading(
-            "Effects that these data cannot show, because no mass is declared, so that no load acts",
+            "Effects that these data cannot show, because no mass is declared, so that no load \
+             acts",
         ));
         blocks.push(Block::list(effect::listed(unloaded)));
     }
     if !absorbed.is_empty() {
         blocks.push(Block::heading(
-            "Effects that these poses cannot show, because fitted parameters make up for them exactly",
+            "Effects that these poses cannot show, because fitted parameters make up for them \
+             exactly",
         ));
         blocks.push(Block::list(effect::listed(absorbed)));
     }

@@ -164,13 +164,15 @@ fn no_correction(closure: &ClosedLoop) -> &'static str {
     if kinds().next().is_none() {
         "No smooth correction was tried, because the place of the structure is not known."
     } else if kinds().find(is_function).is_none() {
-        "No smooth correction was tried, because an error that varies from pose to pose cannot be predicted."
+        "No smooth correction was tried, because an error that varies from pose to pose cannot be \
+         predicted."
     } else if !closure.after.is_trusted() {
         "No smooth correction was tried, because the fit is not to be trusted."
     } else if closure.after.fitted.is_left_out {
         "No smooth correction was tried, because no poses are held out to judge it."
     } else {
-        "No smooth correction of this structure is given: none could be fitted that reduces the error of left-out poses by 5 % or more."
+        "No smooth correction of this structure is given: none could be fitted that reduces the \
+         error of left-out poses by 5 % or more."
     }
 }
 
@@ -210,7 +212,8 @@ fn structure_sentence(structure: &Structure) -> String {
     let at = percent(claims.place.probability);
     if claims.law.value.is_some() {
         return format!(
-            "An error acts {} (probability {at}); its law is not sure. The most probable one tried has a probability of {law}: {}.",
+            "An error acts {} (probability {at}); its law is not sure. The most probable one \
+             tried has a probability of {law}: {}.",
             at_place(place),
             claims.description
         );
@@ -222,7 +225,8 @@ fn structure_sentence(structure: &Structure) -> String {
         );
     }
     format!(
-        "An error acts {} (probability {at}) and depends on {inputs} (probability {}); its law is not known ({chance}).",
+        "An error acts {} (probability {at}) and depends on {inputs} (probability {}); its law is \
+         not known ({chance}).",
         at_place(place),
         percent(claims.depends_on.probability)
     )
@@ -291,7 +295,8 @@ fn unit_of(problem: &Problem, covariate: &Covariate) -> (f64, &'static str) {
 pub(super) fn missing_sigma(fit: &Identification) -> Option<String> {
     (fit.noise != Noise::Declared).then(|| {
         format!(
-            "Declare {} in [data], 1 σ of a measured coordinate. Without it the size of the residual cannot be judged.",
+            "Declare {} in [data], 1 σ of a measured coordinate. Without it the size of the \
+             residual cannot be judged.",
             code("position_sigma_mm")
         )
     })

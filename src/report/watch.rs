@@ -46,7 +46,8 @@ pub(crate) fn watch(
     if let Some(left) = watch.unexplained_error() {
         let hidden = if watch.days > 0.0 {
             format!(
-                "; the drift of {} hides what else has changed, which watch without --drift may name",
+                "; the drift of {} hides what else has changed, which watch without --drift may \
+                 name",
                 days(watch.days)
             )
         } else {
@@ -83,7 +84,8 @@ pub(crate) fn watch(
         let notes = [
             "probability: among all causes that were tried, given that something changed",
             left.as_str(),
-            "more poses: number of further poses like these that would distinguish this cause from the next one; –: none would",
+            "more poses: number of further poses like these that would distinguish this cause \
+             from the next one; –: none would",
         ];
         blocks.push(Block::Table(Table::new(&HEADER, rows, &[0, 2]).noted(&notes)));
     }
@@ -113,7 +115,8 @@ fn explanation(watch: &Watch, is_trusted: bool) -> String {
             format!(", more than noise, the known misfit and {drift} explain")
         }
         (Some(p), _) if watch.has_drifted() => format!(
-            ", as expected from noise, the known misfit and {drift}; more than noise and the known misfit alone explain (p {})",
+            ", as expected from noise, the known misfit and {drift}; more than noise and the \
+             known misfit alone explain (p {})",
             p_value(p)
         ),
         _ => ", as expected from noise and the known misfit".to_owned(),
@@ -188,7 +191,8 @@ fn verdict(watch: &Watch) -> String {
         }
         (Some(cause), _) if cause.kind == CauseKind::Misread => {
             return format!(
-                "Not judged: the rows agree with the estimate if they are read in another way, with {}",
+                "Not judged: the rows agree with the estimate if they are read in another way, \
+                 with {}",
                 cause.label
             );
         }

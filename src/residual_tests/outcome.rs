@@ -220,7 +220,8 @@ fn write_tested(
             let percent = (100.0 * statistic, 100.0 * to);
             write!(
                 f,
-                "residuals {sign} {} (the sign stays at {:.0} % of the steps, expected up to {:.0} %)",
+                "residuals {sign} {} (the sign stays at {:.0} % of the steps, expected up to \
+                 {:.0} %)",
                 order_phrase(*sequence),
                 percent.0,
                 percent.1
@@ -239,7 +240,8 @@ fn write_tested(
             let depend = if *failed { "depend" } else { "do not depend significantly" };
             write!(
                 f,
-                "residuals {depend} on {covariate} (distance correlation {statistic:.2}, {expected})"
+                "residuals {depend} on {covariate} (distance correlation {statistic:.2}, \
+                 {expected})"
             )
         }
         Test::Outliers { worst } => {
@@ -259,7 +261,8 @@ fn write_tested(
             let normal = if *failed { "are not" } else { "may be" };
             write!(
                 f,
-                "residuals {normal} normally distributed (Anderson–Darling {statistic:.2}, {expected})"
+                "residuals {normal} normally distributed (Anderson–Darling {statistic:.2}, \
+                 {expected})"
             )
         }
     }

@@ -121,12 +121,14 @@ fn describe(hypothesis: &select::Hypothesis, effect_words: impl Fn(&Effect) -> S
         HypothesisKind::Effect(effect) => effect_words(effect),
         HypothesisKind::NearHarmonic(1) => {
             format!(
-                "an error {place} that depends on {inputs} with a period of one revolution, law unknown"
+                "an error {place} that depends on {inputs} with a period of one revolution, law \
+                 unknown"
             )
         }
         HypothesisKind::NearHarmonic(order) => {
             format!(
-                "an error {place} that depends on {inputs} with about {order} periods a revolution, law unknown"
+                "an error {place} that depends on {inputs} with about {order} periods a \
+                 revolution, law unknown"
             )
         }
         HypothesisKind::Gear(highest) => {
@@ -134,14 +136,16 @@ fn describe(hypothesis: &select::Hypothesis, effect_words: impl Fn(&Effect) -> S
         }
         HypothesisKind::PerPose => {
             format!(
-                "an error {place} that varies from pose to pose and depends on no known quantity (extra noise)"
+                "an error {place} that varies from pose to pose and depends on no known quantity \
+                 (extra noise)"
             )
         }
         HypothesisKind::Wandering => format!(
             "a random drift {place} in {inputs}, in which each reading follows the one before"
         ),
         HypothesisKind::Linear => format!(
-            "an error {place} that is linear in the position, such as a scale for each axis, or shear"
+            "an error {place} that is linear in the position, such as a scale for each axis, or \
+             shear"
         ),
         HypothesisKind::Sag => {
             format!("a deflection {place} under weight that the problem does not declare")

@@ -87,7 +87,8 @@ pub enum SimulationError {
     },
     /// The arm does not reach a fixture that it should touch.
     #[error(
-        "pose {pose} of the simulation: the arm does not reach the fixture it should touch; check its true position and the ranges"
+        "pose {pose} of the simulation: the arm does not reach the fixture it should touch; check \
+         its true position and the ranges"
     )]
     OutOfReach {
         /// Number of the pose, from 1.

@@ -27,7 +27,8 @@ pub(super) fn key(study: &Study, part: &Part, cell: &Cell) -> String {
     let (first, end) = (part.repetitions.start, part.repetitions.end);
     let truth = canonical(&study.truth);
     hexadecimal(&format!(
-        "{version} {source} {seed} {held_out}\n{sigma:e} {poses} {strategy} {solver} {first} {end}\n{truth}{drawn}\n{problem_text}"
+        "{version} {source} {seed} {held_out}\n{sigma:e} {poses} {strategy} {solver} {first} \
+         {end}\n{truth}{drawn}\n{problem_text}"
     ))
 }
 

@@ -17,7 +17,8 @@ pub enum RunError {
     #[error(transparent)]
     Store(#[from] StoreError),
     #[error(
-        "{missing} of {parts} parts of the study are missing in {}; {}run the study or the missing shards",
+        "{missing} of {parts} parts of the study are missing in {}; {}run the study or the \
+         missing shards",
         list(folders),
         match others {
             0 => String::new(),

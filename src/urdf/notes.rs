@@ -42,7 +42,8 @@ fn chosen_tip(chain: &Chain) -> Option<String> {
     let others = &chain.other_leaves;
     (!others.is_empty()).then(|| {
         format!(
-            "tip {} taken, which has by far the most moving joints; others are {}, chosen with --tip",
+            "tip {} taken, which has by far the most moving joints; others are {}, chosen with \
+             --tip",
             chain.ends().1,
             others.join(", ")
         )
@@ -146,7 +147,8 @@ fn right_angles(origins: &[&Joint]) -> Option<String> {
         };
         let (values, joints, degrees) = (values.join(", "), joints.join(", "), degrees.join(", "));
         format!(
-            "{values} rad at {joints} {verb} read as exactly {degrees}, of which {subject}; values with more decimals are used as written"
+            "{values} rad at {joints} {verb} read as exactly {degrees}, of which {subject}; \
+             values with more decimals are used as written"
         )
     })
 }

@@ -87,7 +87,8 @@ pub fn yaml(origins: &[JointOrigin], form: YamlFormat) -> String {
                 .to_owned()
         }
         YamlFormat::Ros => {
-            "# Each frame seen from the one before [m, rad]; each joint turns about, or slides along, its z.\n"
+            "# Each frame seen from the one before [m, rad]; each joint turns about, or slides \
+             along, its z.\n"
                 .to_owned()
         }
     };

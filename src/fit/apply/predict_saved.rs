@@ -91,7 +91,8 @@ pub enum PredictError {
     /// The measured rows of a session, tool or fixture that the estimate lacks do not determine its
     /// pose.
     #[error(
-        "{name} is not in the estimate, and its rows do not determine it; measure more poses there{}",
+        "{name} is not in the estimate, and its rows do not determine it; measure more poses \
+         there{}",
         if name.starts_with("base[") {
             ", or, if base and instrument stand where they stood, give these rows a session of the \
              estimate"
@@ -106,7 +107,8 @@ pub enum PredictError {
     /// There is no estimate, and the measured rows do not determine the pose of a base, tool or
     /// fixture.
     #[error(
-        "the rows do not determine {name}, and there is no estimate to take it from; measure more poses there"
+        "the rows do not determine {name}, and there is no estimate to take it from; measure more \
+         poses there"
     )]
     OpenWithoutEstimate {
         /// Name of the parameter that the rows do not determine.

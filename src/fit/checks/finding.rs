@@ -84,13 +84,15 @@ macro_rules! finding_codes {
 
 finding_codes! {
     TooFewEquations: Error "too-few-equations" ["of", "coordinates", "parameters"]
-        "The whole fit, a base or a tool has fewer measured coordinates than parameters without a prior.",
+        "The whole fit, a base or a tool has fewer measured coordinates than parameters without a \
+         prior.",
         "measure more different poses, or give priors";
     BaseNotDetermined: Error "base-not-determined" ["of", "poses"]
         "The measured points of a base leave its pose open, as points on a line do.",
         "measure more poses of this session, or give its base a prior";
     Misread: Error "misread" ["explanations", "before", "after"]
-        "With another reading of the table or the problem, less than a fifth of the error remains, or no more than noise.",
+        "With another reading of the table or the problem, less than a fifth of the error \
+         remains, or no more than noise.",
         "correct units, signs, order or convention in the table or the problem";
     StrategyMisfit: Error "strategy-misfit" ["before", "after"]
         "Another reading of the input would explain the error, but strategy joint leaves less than a \
@@ -98,24 +100,31 @@ finding_codes! {
         "fit with strategy joint";
     ViewsReversed: Error "views-reversed" ["views", "before", "after"]
         "Some views number the points of a marker from the other end.",
-        "reverse the column point in these views or leave them out; a board that looks different after half a turn prevents it";
+        "reverse the column point in these views or leave them out; a board that looks different \
+         after half a turn prevents it";
     ColumnDoubted: Error "column-doubted" ["columns", "before", "after"]
-        "The fit is far off, and a column of the table stands still, is filled down, is sorted by itself, or is not followed by the positions.",
+        "The fit is far off, and a column of the table stands still, is filled down, is sorted by \
+         itself, or is not followed by the positions.",
         "correct the column, or leave its rows out";
     RowsDoubted: Error "rows-doubted" ["rows", "of", "before", "after"]
         "The fit is far off, and the nominal arm fits most rows without the others.",
         "correct these rows, or leave them out";
     PositionsComputed: Error "positions-computed" ["rms"]
-        "The registered nominal arm predicts the positions to 10 µm per metre of its reach and a fifth of σ, as no built arm does.",
-        "measure the positions with an instrument; those that the controller shows are computed from the joint angles";
+        "The registered nominal arm predicts the positions to 10 µm per metre of its reach and a \
+         fifth of σ, as no built arm does.",
+        "measure the positions with an instrument; those that the controller shows are computed \
+         from the joint angles";
     MissesMeasurements: Error "misses-measurements" ["kind", "rms", "spread"]
-        "The fitted arm misses the measurements by more than 2 % of their spread and more than 100 σ.",
+        "The fitted arm misses the measurements by more than 2 % of their spread and more than \
+         100 σ.",
         "check units, signs of joints, and whether base and session are declared";
     NoBetterThanNominal: Error "no-better-than-nominal" ["kind", "before", "after"]
-        "The fitted arm is as far from contacts, distances or tilts as the nominal arm, and more than 1000 σ off.",
+        "The fitted arm is as far from contacts, distances or tilts as the nominal arm, and more \
+         than 1000 σ off.",
         "check units, signs of joints, and the names in the table";
     OtherSize: Error "other-size" ["measured", "expected"]
-        "The spread of the measured points differs from that of the nominal arm by more than a factor of 2.",
+        "The spread of the measured points differs from that of the nominal arm by more than a \
+         factor of 2.",
         "check units, and what the columns hold";
     NotConverged: Error "not-converged" ["termination"]
         "The fit did not converge.",
@@ -124,7 +133,8 @@ finding_codes! {
         "The fit of bases and tools of held-out sessions did not converge.",
         "check these sessions, or hold out other rows";
     TwoSolutions: Error "two-solutions" ["parameter", "estimate", "second", "excess", "probability", "apart", "configuration"]
-        "A second arm, more than 3 standard errors from the fitted one, explains the measurements too: its probability is above 0.1 %.",
+        "A second arm, more than 3 standard errors from the fitted one, explains the measurements \
+         too: its probability is above 0.1 %.",
         "measure poses in which the two differ, or give priors that decide between them";
     BeyondPrior: Error "beyond-prior" ["parameter", "sigmas"]
         "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",
@@ -141,32 +151,41 @@ finding_codes! {
         "Every held-out row is an identification row again, so that held-out errors judge nothing.",
         "hold out rows that were not fitted";
     HeldOutMissed: Error "held-out-missed" ["kind", "median", "spread"]
-        "Half of the held-out rows are missed by more than 2 % of the spread of the fitted ones and more than 100 σ.",
+        "Half of the held-out rows are missed by more than 2 % of the spread of the fitted ones \
+         and more than 100 σ.",
         "check whether these rows belong together, and whether the fitted poses cover them";
     HeldOutWorse: Error "held-out-worse" ["kind", "before", "after"]
-        "The fitted arm misses held-out rows by more than 1.5 times what the nominal arm misses them by.",
+        "The fitted arm misses held-out rows by more than 1.5 times what the nominal arm misses \
+         them by.",
         "more poses, fewer free parameters or smaller priors are needed";
     PriorContradicted: Error "prior-contradicted" ["rule", "factor", "sigma_ratio"]
-        "The data refute the σ of a rule of `[parameters]`: with a σ 3 and more times as large the residual falls by more than half.",
+        "The data refute the σ of a rule of `[parameters]`: with a σ 3 and more times as large \
+         the residual falls by more than half.",
         "declare a larger σ, or check the nominal values and their units";
     NoiseBeyondDeclared: Error "noise-beyond-declared" ["noise_factor", "sigma_taken"]
         "Residuals and priors indicate a noise variance of more than 1000 times the declared one.",
         "look for what the model lacks with flexcal loop, or check the unit of the declared σ";
     PayloadAtTarget: Error "payload-at-target" ["before", "after"]
-        "The measurements indicate that the payload hangs at the identified target; the problem does not declare its place.",
+        "The measurements indicate that the payload hangs at the identified target; the problem \
+         does not declare its place.",
         "declare payload_at = \"target\" in [tool], or its place as payload_at_m";
     OrientationMisfit: Error "orientation-misfit" ["rms", "sigma", "conventions"]
-        "The fitted arm misses the measured orientations by more than 2° and 20 σ, or their scatter is more than 31 times their declared σ.",
+        "The fitted arm misses the measured orientations by more than 2° and 20 σ, or their \
+         scatter is more than 31 times their declared σ.",
         "check the convention of the orientation columns and their frames";
     LensContradicted: Error "lens-contradicted" ["parameters", "before", "after"]
-        "Held intrinsics of a camera cause most of the misfit: with them free it falls by three quarters of what exceeds noise, and beyond chance (F test, probability below 0.0001).",
+        "Held intrinsics of a camera cause most of the misfit: with them free it falls by three \
+         quarters of what exceeds noise, and beyond chance (F test, probability below 0.0001).",
         "free them in [parameters] (\"camera*.f*\" = { free = true } …), or declare better ones";
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
-        "The poses measure fewer coordinates than parameters are fitted, so that priors decide part of the result.",
+        "The poses measure fewer coordinates than parameters are fitted, so that priors decide \
+         part of the result.",
         "measure more different poses";
     NarrowPoses: Warning "narrow-poses" ["columns", "alike"]
-        "A joint stands still in all fitted rows, or no joint turns by more than 10°, so that the fit says little about other poses.",
-        "if the arm will move beyond these values, measure poses in which all joints move (flexcal plan chooses them)";
+        "A joint stands still in all fitted rows, or no joint turns by more than 10°, so that the \
+         fit says little about other poses.",
+        "if the arm will move beyond these values, measure poses in which all joints move \
+         (flexcal plan chooses them)";
     RowsChanged: Warning "rows-changed" ["row", "place", "before", "after"]
         "From a row on, one place of the model (target, base, camera, marker, a joint's zero position, or \
          the whole arm) is different: this change explains more than four fifths of what noise does \
@@ -177,17 +196,21 @@ finding_codes! {
         "The nominal arm misses the measurements by more than a tenth of their spread.",
         "check units, signs of joints, and whether the numbers are of this convention of frames";
     GivesWayUpwards: Warning "gives-way-upwards" ["parameter", "compliance", "sigmas"]
-        "A joint gives way against its load: its compliance as a whole is negative by more than 5 standard errors.",
-        "check the sign of gravity_m_s2, the places of masses and payload, and whether a spring, counterweight or hoist is missing";
+        "A joint gives way against its load: its compliance as a whole is negative by more than 5 \
+         standard errors.",
+        "check the sign of gravity_m_s2, the places of masses and payload, and whether a spring, \
+         counterweight or hoist is missing";
     CommandsRounded: Warning "commands-rounded" ["step_deg", "rounding", "rms"]
-        "The commands of each joint are multiples of a step, and rounding to these steps would leave an error of the size of the residual.",
+        "The commands of each joint are multiples of a step, and rounding to these steps would \
+         leave an error of the size of the residual.",
         "log the joint angles with more digits";
     SigmaOverstated: Warning "sigma-overstated" ["sigma", "rms"]
         "The declared σ of the leading kind of rows (positions, if there are any) is more than \
          30 times what the fit leaves.",
         "check the unit of σ: micrometres under a key in millimetres make it 1000 times too large";
     EarlierEstimateContradicted: Warning "earlier-estimate-contradicted" ["cause", "probability", "widened"]
-        "New rows contradict the earlier estimate that is the prior, with a false alarm in at most one of 100 fits.",
+        "New rows contradict the earlier estimate that is the prior, with a false alarm in at \
+         most one of 100 fits.",
         "find what happened to the arm since (flexcal watch tells); if the prior is of a fleet, \
          find how this arm differs from it";
     HeldOutRepeated: Warning "held-out-repeated" ["rows", "of"]
@@ -200,19 +223,26 @@ finding_codes! {
         "Some held-out rows are farther from the prediction than its σ allows.",
         "look for mistyped numbers and signs there; where there are none, run flexcal loop";
     HeldOutBeyondPrediction: Warning "held-out-beyond-prediction" ["chi2", "coordinates", "p_value"]
-        "The held-out residuals are larger than the σ and the covariance of the fit predict (probability below 0.001).",
+        "The held-out residuals are larger than the σ and the covariance of the fit predict \
+         (probability below 0.001).",
         "look for what the model lacks with flexcal loop, or measure poses like the held-out ones";
     HeldOutNotBetter: Warning "held-out-not-better" ["kind", "before", "after"]
-        "The fit made the error of held-out rows worse than that of the nominal arm, beyond chance.",
+        "The fit made the error of held-out rows worse than that of the nominal arm, beyond \
+         chance.",
         "measure more poses, free fewer parameters, or give narrower priors";
     BoundInUnidentifiedDirection: Warning "bound-in-unidentified-direction" ["parameter", "bound", "deviation", "partners"]
-        "A parameter rests on a bound along a direction that the data hardly see, and others follow it.",
+        "A parameter rests on a bound along a direction that the data hardly see, and others \
+         follow it.",
         "fix one of these parameters, or give them priors";
     LimitContradicted: Warning "limit-contradicted" ["limits", "before", "after"]
-        "Bounds or constraints cause most of a misfit that contradicts the declared σ: without them less than half of the error remains.",
+        "Bounds or constraints cause most of a misfit that contradicts the declared σ: without \
+         them less than half of the error remains.",
         "check these limits";
     HeldParameter: Warning "held-parameter" ["parameter", "alike", "before", "after"]
-        "A parameter of the geometry that the problem holds explains most of a misfit that contradicts the declared σ: free, it takes away more than four fifths of what noise does not explain, or the six of a base together more than half. The same of the held numbers of a point, an anchor or a surface, which leave less than a twentieth.",
+        "A parameter of the geometry that the problem holds explains most of a misfit that \
+         contradicts the declared σ: free, it takes away more than four fifths of what noise does \
+         not explain, or the six of a base together more than half. The same of the held numbers \
+         of a point, an anchor or a surface, which leave less than a twentieth.",
         "free this parameter in [parameters]";
     InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]
         "A few rows cause most of the misfit.",
@@ -221,23 +251,28 @@ finding_codes! {
         "A robust loss sets many rows aside, and time, session, a joint or a load decides which.",
         "look for the cause with flexcal loop, or check these rows";
     HeldOutBaseNotDetermined: Warning "held-out-base-not-determined" ["of", "poses"]
-        "The held-out points of a session do not determine its base or tool, so that its held-out errors say little.",
+        "The held-out points of a session do not determine its base or tool, so that its held-out \
+         errors say little.",
         "measure more poses of this session, or give its base a prior";
     UnsteadyPoint: Warning "unsteady-point" ["point", "times", "share"]
-        "The predictions at one touched point scatter far more than at the others, and along one direction.",
+        "The predictions at one touched point scatter far more than at the others, and along one \
+         direction.",
         "check whether the point moved or gave way; if it moved, declare a further [[point]] and \
          name that one in the rows after the move";
     Outliers: Note "outliers" ["rows", "of"]
         "Some identification rows are farther from the fit than noise explains.",
         "look at these rows; a section [robust] limits their influence";
     PriorWidth: Note "prior-width" ["rule", "declared", "estimated"]
-        "The fitted deviations indicate a prior σ that is more than twice as large, or less than half.",
+        "The fitted deviations indicate a prior σ that is more than twice as large, or less than \
+         half.",
         "declare the estimated σ, or leave the prior as it is where it is known better";
     ResidualBeyondDeclared: Note "residual-beyond-declared" ["noise_factor", "sigma_taken"]
-        "Residuals and priors indicate a noise variance above the declared one, by a factor of up to 1000.",
+        "Residuals and priors indicate a noise variance above the declared one, by a factor of up \
+         to 1000.",
         "look for what the model lacks with flexcal loop, or declare a larger σ";
     NotToldApart: Note "not-told-apart" ["what", "parameters"]
-        "The rows alone leave a quantity open: the pose of the base, the scale, a focal length, or parameters that move the same way.",
+        "The rows alone leave a quantity open: the pose of the base, the scale, a focal length, \
+         or parameters that move the same way.",
         "hold some of the parameters, or measure what determines them";
 }
 

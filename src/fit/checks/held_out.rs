@@ -199,7 +199,8 @@ impl Check for HeldOutReached {
             let median = median(lengths.filter(|length| length.is_finite())).unwrap_or(0.0);
             let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
             let text = format!(
-                "half of the held-out {} are missed by more than {}, {:.0} % of the spread of the fitted ones",
+                "half of the held-out {} are missed by more than {}, {:.0} % of the spread of the \
+                 fitted ones",
                 row_noun(kind),
                 format_error(kind, median, 1),
                 100.0 * median / spread
@@ -209,7 +210,8 @@ impl Check for HeldOutReached {
                 let finding = Finding::new(FindingCode::HeldOutMissed, numbers, text);
                 match held_base(fitting) {
                     Some(base) => finding.with_remedy(format!(
-                        "base[{base}] is held where it is declared, while another base is free: free it in [parameters], \"base[{base}].*\" = {{ free = true }}"
+                        "base[{base}] is held where it is declared, while another base is free: \
+                         free it in [parameters], \"base[{base}].*\" = {{ free = true }}"
                     )),
                     None => finding,
                 }
@@ -250,7 +252,8 @@ impl Check for BetterThanNominal {
             return Vec::new();
         }
         let text = format!(
-            "the fitted arm misses held-out {} by more than the nominal arm ({} rms before, {} after)",
+            "the fitted arm misses held-out {} by more than the nominal arm ({} rms before, {} \
+             after)",
             row_noun(kind),
             format_error(kind, before, 3),
             format_error(kind, after, 3)

@@ -155,7 +155,8 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
         names => format!(" (these poses do not tell it from {})", names.join(" or ")),
     };
     let text = format!(
-        "{} is held at its nominal value{others}: if it is free, it deviates by {}, and the rms error is {} instead of {}",
+        "{} is held at its nominal value{others}: if it is free, it deviates by {}, and the rms \
+         error is {} instead of {}",
         best.name,
         best.deviation,
         format_error(leading.kind(), best.trial.rms, 3),

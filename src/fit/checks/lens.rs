@@ -198,7 +198,8 @@ fn lens_readings(fixture: &Fixture) -> Vec<(String, Vec<Option<f64>>)> {
         (
             [0, 1, 2, 3, 5, 6, 4],
             1.0,
-            "the distortion in the order k1, k2, p1, p2, k3 (written in the order k1, k2, k3, p1, p2)",
+            "the distortion in the order k1, k2, p1, p2, k3 (written in the order k1, k2, k3, p1, \
+             p2)",
         ),
         ([1, 0, 2, 3, 4, 5, 6], 1.0, "the two numbers of centre_px exchanged"),
     ];

@@ -48,7 +48,8 @@ impl Check for LimitsHold {
         let named = limits[..limits.len().min(MAX_NAMED)].join(", ");
         let name = kind.observation.kind();
         let text = format!(
-            "limits of the problem cause most of the misfit: {named}{more}; without limits the rms error is {} instead of {}",
+            "limits of the problem cause most of the misfit: {named}{more}; without limits the \
+             rms error is {} instead of {}",
             format_error(name, after, 3),
             format_error(name, before, 3)
         );

@@ -192,7 +192,8 @@ fn other_size_finding((measured, expected): (f64, f64), declared: Option<f64>) -
         return None;
     }
     let text = format!(
-        "the measured points lie {:.1} mm (rms) from their centre, those of the nominal arm {:.1} mm",
+        "the measured points lie {:.1} mm (rms) from their centre, those of the nominal arm {:.1} \
+         mm",
         measured * 1e3,
         expected * 1e3
     );

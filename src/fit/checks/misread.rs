@@ -139,7 +139,8 @@ impl Check for ReadAsMeant {
         }
         // Another cause may leave as much.
         let text = format!(
-            "the error of {as_read} has no explanation yet; it would fall to {rest}, which is still more than the declared σ, with {named}{more}"
+            "the error of {as_read} has no explanation yet; it would fall to {rest}, which is \
+             still more than the declared σ, with {named}{more}"
         );
         let remedy = "check that and what acts alike; the model may also lack something".to_owned();
         vec![found(text).with_remedy(remedy)]

@@ -74,7 +74,8 @@ impl Open {
                 format!(
                     "the pose of the base: no rows against known places determine it ({names})"
                 ),
-                "fix base.* (fixed = true), or declare the place of a point, an anchor or a marker (at_m)",
+                "fix base.* (fixed = true), or declare the place of a point, an anchor or a \
+                 marker (at_m)",
             ),
             Self::Apart => (format!("the rows do not tell {names} apart"), "hold some of them"),
             Self::Focal => (

@@ -36,7 +36,8 @@ impl Check for OrientationsFit {
         }
         let conventions = fitting_conventions(fit, rms);
         let text = format!(
-            "the fitted arm misses the measured orientations by {:.1}° rms, {:.0} times the declared σ",
+            "the fitted arm misses the measured orientations by {:.1}° rms, {:.0} times the \
+             declared σ",
             rms.to_degrees(),
             rms / sigma
         );
@@ -47,7 +48,8 @@ impl Check for OrientationsFit {
                 "the columns fit as {convention}: call them rx_rad, ry_rad and rz_rad"
             )),
             Some(convention) => finding.with_remedy(format!(
-                "the measured orientations fit if the columns are read as {convention}: correct the order or the meaning of the columns"
+                "the measured orientations fit if the columns are read as {convention}: correct \
+                 the order or the meaning of the columns"
             )),
             None => finding,
         }]

@@ -240,7 +240,8 @@ impl Check for WithinArmSize {
             };
             let name = &parameter.name;
             let text = format!(
-                "{name} deviates from nominal by {sizes:.1} times {unit}: more than is possible on an arm"
+                "{name} deviates from nominal by {sizes:.1} times {unit}: more than is possible \
+                 on an arm"
             );
             let numbers = [name.as_str().into(), sizes.into()];
             Finding::new(FindingCode::BeyondArmSize, numbers, text)
@@ -277,7 +278,8 @@ impl Check for GivesWayToLoads {
         let finding = |(parameter, compliance, sigmas): (&Parameter, f64, f64)| {
             let name = &parameter.name;
             let text = format!(
-                "{name} is {:.3} µrad/(N·m), {sigmas:.0} standard errors below 0: the arm bends against its load",
+                "{name} is {:.3} µrad/(N·m), {sigmas:.0} standard errors below 0: the arm bends \
+                 against its load",
                 compliance * 1e6
             );
             let numbers = [name.as_str().into(), compliance.into(), sigmas.into()];

@@ -124,7 +124,8 @@ fn held_out_finding(
 /// than parameters without a prior.
 fn too_few_finding(of: String, coordinates: usize, parameters: usize) -> Finding {
     let text = format!(
-        "{of}: {coordinates} measured coordinates for {parameters} parameters without a prior (a pose measured again adds none)"
+        "{of}: {coordinates} measured coordinates for {parameters} parameters without a prior (a \
+         pose measured again adds none)"
     );
     let numbers = [of.into(), coordinates.into(), parameters.into()];
     Finding::new(FindingCode::TooFewEquations, numbers, text)
@@ -219,7 +220,8 @@ fn undetermined_base_finding(
     let of_base = rows.iter().copied().filter(|&row| placement.base_of(row) == base);
     let (of, poses) = (label("base", &placement.bases[base]), count_distinct(numbers, of_base));
     let text = format!(
-        "{of}: its points, of {poses} different poses, are too few or lie on a line, so that a rotation of the base about it is not determined"
+        "{of}: its points, of {poses} different poses, are too few or lie on a line, so that a \
+         rotation of the base about it is not determined"
     );
     Some(Finding::new(FindingCode::BaseNotDetermined, [of.into(), poses.into()], text))
 }

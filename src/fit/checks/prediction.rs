@@ -154,7 +154,8 @@ impl Check for NotWorseThanNominal {
         }
         let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
         let text = format!(
-            "the fit made the error of held-out {} worse ({} rms with the nominal arm, {} fitted), beyond chance",
+            "the fit made the error of held-out {} worse ({} rms with the nominal arm, {} \
+             fitted), beyond chance",
             row_noun(kind),
             format_error(kind, before, 3),
             format_error(kind, after, 3)

@@ -51,7 +51,8 @@ impl Check for PriorWidths {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let finding = |size: &crate::fit::PriorSize| {
             let text = format!(
-                "the fitted {} of {} joints deviate as if the σ of their prior were {:.2} times the declared one",
+                "the fitted {} of {} joints deviate as if the σ of their prior were {:.2} times \
+                 the declared one",
                 size.pattern,
                 size.count,
                 size.found / size.declared
@@ -105,7 +106,8 @@ impl Check for NoiseIsDeclared {
         let numbers = [fit.noise_factor.into(), fit.sigma_taken.into()];
         if fit.noise_factor <= MAX_NOISE_FACTOR {
             let text = format!(
-                "the residual is {ratio:.2} times as large as the declared σ, so that σ is too small or the model lacks something"
+                "the residual is {ratio:.2} times as large as the declared σ, so that σ is too \
+                 small or the model lacks something"
             );
             return vec![Finding::new(FindingCode::ResidualBeyondDeclared, numbers, text)];
         }

@@ -144,7 +144,8 @@ impl Check for SetAsideByChance {
         let finding = |Selection { quantity, p_value }: Selection| {
             let (count, of) = (fit.outliers.len(), rows.len());
             let text = format!(
-                "the robust loss sets {count} of {of} rows aside, and {quantity} decides which: a cause acts in them"
+                "the robust loss sets {count} of {of} rows aside, and {quantity} decides which: a \
+                 cause acts in them"
             );
             let numbers = [count.into(), of.into(), json!(quantity), p_value.into()];
             Finding::new(FindingCode::RowsSetAside, numbers, text)

@@ -72,7 +72,8 @@ fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Option<Fi
         )
     } else {
         format!(
-            "no pose within the ranges of the joints tells their targets apart: hold {name}, or give it a narrower prior"
+            "no pose within the ranges of the joints tells their targets apart: hold {name}, or \
+             give it a narrower prior"
         )
     };
     Some(finding.with_remedy(remedy))

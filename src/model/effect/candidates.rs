@@ -262,7 +262,8 @@ impl Effect {
                 unless(both_sides, "the joint was not approached from both sides")
             }
             Need::Play if self.joint().is_some_and(|joint| slides(problem, joint)) => Some(
-                "no columns approach1 …, and a sliding joint has no moment of the loads that tells the side",
+                "no columns approach1 …, and a sliding joint has no moment of the loads that \
+                 tells the side",
             ),
             Need::Loads | Need::Play => unless(data.has_gravity(), NO_LOADS),
             Need::Covariate => {

@@ -97,7 +97,8 @@ mod tests {
         let joints: Vec<String> =
             ["prismatic"].into_iter().chain(["revolute"; 6]).map(joint).collect();
         let text = format!(
-            "name = \"rail\"\ndh = \"standard\"\njoint = [{}]\n[data]\nfiles = [\"m.csv\"]\nposition_sigma_mm = 0.1\n",
+            "name = \"rail\"\ndh = \"standard\"\njoint = [{}]\n[data]\nfiles = \
+             [\"m.csv\"]\nposition_sigma_mm = 0.1\n",
             joints.join(", ")
         );
         let problem = Problem::parse(&text, std::path::Path::new("problem.toml")).unwrap();

@@ -45,11 +45,13 @@ impl Misreading {
             }
             (Self::Scale { .. }, Some(size)) => format!("{self}: {size:.4} times as large"),
             (Self::Screw { joint, from, .. }, Some(size)) => format!(
-                "joint {joint} that also turns by {:.3}°/mm of joint {from} (as a ball screw does; declare joint-coupling)",
+                "joint {joint} that also turns by {:.3}°/mm of joint {from} (as a ball screw \
+                 does; declare joint-coupling)",
                 size.to_degrees() * 1e-3
             ),
             (Self::Coupled { joint, from, .. }, Some(size)) => format!(
-                "joint {joint} that also turns by {size:.3} times the command of joint {from} (declare joint-coupling)"
+                "joint {joint} that also turns by {size:.3} times the command of joint {from} \
+                 (declare joint-coupling)"
             ),
             (Self::Carrier { target, joint }, _) => match problem.targets.get(target) {
                 Some(named) => format!(
@@ -265,7 +267,10 @@ impl fmt::Display for Misreading {
             }
             Self::AxisScale { axis, millionths } => {
                 let (name, ratio) = (['x', 'y', 'z'][axis], f64::from(millionths) * 1e-6);
-                write!(f, "{name} of the positions that is {ratio:.4} times as large as it should be")
+                write!(
+                    f,
+                    "{name} of the positions that is {ratio:.4} times as large as it should be"
+                )
             }
             Self::AxisInches { axis } => {
                 let name = ['x', 'y', 'z'][axis];
@@ -278,11 +283,12 @@ impl fmt::Display for Misreading {
                 if from > 0 { write!(f, ", from row {} of the table on", from + 1) } else { Ok(()) }
             }
             Self::ExchangedAxes => f.write_str("columns u and v that are exchanged"),
-            Self::FromBottom => {
-                f.write_str("a column v that counts from the bottom of the image (write height − v)")
-            }
+            Self::FromBottom => f.write_str(
+                "a column v that counts from the bottom of the image (write height − v)",
+            ),
             Self::Transposed => f.write_str(
-                "points of the marker that are numbered along the other side (its rows and columns exchanged)",
+                "points of the marker that are numbered along the other side (its rows and \
+                 columns exchanged)",
             ),
             Self::FromOne => {
                 f.write_str("points of the marker that are numbered from 1 (point counts from 0)")
@@ -353,9 +359,9 @@ impl Misreading {
             Self::Hoist { is_reversed: false } => {
                 f.write_str("hoist forces that are in kilograms, declared in newtons")
             }
-            Self::Hoist { is_reversed: true } => {
-                f.write_str("a hoist that pulls the other way (its direction, or the signs of hoist_N)")
-            }
+            Self::Hoist { is_reversed: true } => f.write_str(
+                "a hoist that pulls the other way (its direction, or the signs of hoist_N)",
+            ),
             Self::ShiftedPayload { by } => {
                 let (rows, side) = (by.unsigned_abs(), if by > 0 { "before" } else { "after" });
                 let plural = if rows == 1 { "" } else { "s" };
@@ -404,10 +410,12 @@ impl Misreading {
                 )
             }
             Self::HeldTarget => f.write_str(
-                "a target that lies elsewhere than [tool] declares (correct it there, or free it in [parameters]: \"tool.*\" = { free = true })",
+                "a target that lies elsewhere than [tool] declares (correct it there, or free it \
+                 in [parameters]: \"tool.*\" = { free = true })",
             ),
             Self::HeldBase => f.write_str(
-                "a base that stands elsewhere than declared (free it in [parameters]: \"base.*\" = { free = true })",
+                "a base that stands elsewhere than declared (free it in [parameters]: \"base.*\" \
+                 = { free = true })",
             ),
             Self::TargetInMillimetres => {
                 f.write_str("a target of [tool] that is in millimetres, declared in metres")
