@@ -184,7 +184,9 @@ fn widen_prior(found: &Identification, file: &str) -> String {
 /// Returns true if a held number of a point, an anchor or a surface causes the misfit.
 fn holds_a_wrong_fixture(found: &Identification) -> bool {
     let held = found.finding(FindingCode::HeldParameter);
-    held.and_then(|held| held.word("parameter")).is_some_and(|name| name.contains('['))
+    let is_of =
+        |name: &str| ["point[", "anchor[", "surface["].iter().any(|of| name.starts_with(of));
+    held.and_then(|held| held.word("parameter")).is_some_and(is_of)
 }
 
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared

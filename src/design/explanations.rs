@@ -144,7 +144,7 @@ impl Named {
 }
 
 /// Returns the effects that the loop.json of `problem` does not exclude in the place of effects
-/// that the problem declares, each with its probability.
+/// that the problem declares and that the loop has fitted, each with its probability among all.
 ///
 /// # Errors
 /// Returns the errors of [`Explanations::read`], except that the loop.json of another problem has
@@ -164,7 +164,9 @@ pub fn rivals(file: &Path, problem: &Problem) -> Result<Vec<Rival>, Box<dyn Erro
         }
         let others = found.alternatives.iter().map(|other| other.probability).sum::<f64>();
         let law = found.claims.as_ref().map_or(1.0 - others, |claims| claims.law.probability);
-        for other in found.alternatives.iter().take(MAX_ALTERNATIVES) {
+        // Alternatives that the loop did not fit state no error of the instrument.
+        let fitted = found.alternatives.iter().filter(|other| !other.named.parameters.is_empty());
+        for other in fitted.take(MAX_ALTERNATIVES) {
             let share = other.probability / (law.max(0.0) + others).max(f64::MIN_POSITIVE);
             let rival = other.named.side(file, problem)?;
             rivals.push(Rival { declared: declared.clone(), rival, share });

@@ -312,11 +312,6 @@ pub enum WarningKind {
     )]
     TargetPerRow { rows: usize },
     #[error(
-        "{value} °C in every row, so that declared effects of the temperature cannot be told from \
-         the zero positions and lengths of the arm: measure at other temperatures, or leave them out"
-    )]
-    ConstantTemperature { value: String },
-    #[error(
         "[{}, {}] is far from the middle of image_px = [{}, {}], and near it if exchanged: write \
          [{}, {}]",
         centre[0], centre[1], image[0], image[1], centre[1], centre[0]
@@ -380,7 +375,7 @@ impl WarningKind {
     /// Returns true if no arm can have been in the state that the table states.
     #[doc(hidden)]
     pub const fn refutes_table(&self) -> bool {
-        matches!(self, Self::Kelvins { .. } | Self::NoReading { .. })
+        matches!(self, Self::Kelvins { .. })
     }
 }
 

@@ -159,7 +159,7 @@ pub(super) fn moving_arm(
 ) -> Option<Warning> {
     let gaps = times.iter().filter_map(|&time| nearest_rest(rests, time));
     let rows = gaps.filter(|(_, gap)| *gap > PAIR_GAP).count();
-    let offset = if rows > 0 { offset() } else { None };
+    let offset = if rows > 1 { offset() } else { None };
     let is_usual = 2 * rows > times.len() && offset.is_none();
     let kind = WarningKind::MovedAtTime { rows, of: times.len(), offset };
     (rows > 0 && !is_usual).then(|| Warning { location: location.clone(), kind })

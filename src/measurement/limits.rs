@@ -204,18 +204,6 @@ impl Measurements {
             .then(|| self.warning(0, "target", WarningKind::TargetPerRow { rows }))
     }
 
-    /// Returns a warning, located at the first row, if the temperature is the same in all rows
-    /// although declared effects depend on it.
-    pub(super) fn constant_temperature(&self, problem: &Problem) -> Option<Warning> {
-        let values = self.temperature.as_deref()?;
-        let &first = values.first()?;
-        let is_constant =
-            values.len() > 1 && values.iter().all(|value| value.total_cmp(&first).is_eq());
-        let is_used = problem.effects.iter().any(|declared| declared.effect.is_thermal());
-        let kind = WarningKind::ConstantTemperature { value: format!("{first}") };
-        (is_constant && is_used).then(|| self.warning(0, "temperature_C", kind))
-    }
-
     /// Returns a warning, located at the first row, if all times, or the usual times between rows,
     /// are so large that they are probably in milliseconds.
     pub(super) fn milliseconds(&self) -> Option<Warning> {

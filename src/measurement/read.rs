@@ -334,7 +334,6 @@ impl<'a> Tables<'a> {
                     let zeros = if is_comma { "0;0;0" } else { "0,0,0" };
                     warnings.extend(measurements.lost_targets(zeros)?);
                     warnings.extend(measurements.same_pose_elsewhere());
-                    warnings.extend(measurements.constant_temperature(problem));
                     warnings.extend(measurements.rounded_positions(problem));
                     warnings.extend(measurements.unused_sigma(problem));
                 }

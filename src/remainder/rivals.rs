@@ -14,7 +14,7 @@ pub struct Rival {
     pub declared: Side,
     /// Effect that may act instead.
     pub rival: Side,
-    /// Probability that the rival acts, of the two.
+    /// Probability that the rival acts, among all effects that may act in this place.
     pub share: f64,
 }
 

@@ -69,8 +69,9 @@ pub fn undecided_commands(found: &Compensation, rivals: &[Rival]) -> Option<(Str
         return None;
     }
     let said = format!(
-        "flexcal loop did not decide whether {} or, with {}, {}: in that case these commands miss by {} mm more in \
-         root mean square, {} mm at most; the bound holds for both",
+        "flexcal loop did not decide whether {} or, with {}, {}: by the errors that these state for \
+         the instrument, the commands would differ by {} mm in root mean square, {} mm at most; \
+         the bound covers that",
         rival.declared.description,
         percent(rival.share),
         rival.rival.description,

@@ -8,7 +8,7 @@ use super::errors::{brief, row_noun, test_rows_word, unit, with_unit};
 use super::prior::contradiction;
 use super::remainder::{HELD_OUT, PredictionAccuracy};
 use crate::fit::{FindingCode, Identification, Noise, Outlier, TypicalScatter, size_of_kind};
-use crate::problem::Problem;
+use crate::problem::{Observation, Problem};
 use crate::quantity::format::{counted, decimals, mm, number};
 use crate::results::{ResidualSize, rows_in};
 
@@ -353,7 +353,9 @@ pub(super) fn reservations(
 fn uncertainty(found: &Identification) -> Option<String> {
     let [fitted, held_out] = [&found.fitted.identification, &found.fitted.held_out];
     let ratio = held_out.rms.norm / fitted.rms.norm;
-    (ratio.is_finite() && ratio > UNCERTAIN_RATIO).then(|| {
+    let is_of_images = fitted.kind == Observation::Pixel(0, 0, 0).kind();
+    let exceeds_noise = held_out.rms.norm > UNCERTAIN_RATIO * found.sigma_taken;
+    (is_of_images && exceeds_noise && ratio.is_finite() && ratio > UNCERTAIN_RATIO).then(|| {
         format!(
             "held-out {}s miss by {ratio:.0} times as much as fitted ones, so more poses are \
              needed",

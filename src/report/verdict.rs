@@ -251,7 +251,7 @@ pub(super) fn declared(effect: &NamedEffect) -> String {
 pub(super) fn alternative(other: &AlternativeEffect) -> String {
     let probability = percent(other.probability);
     let from = if other.is_undecided() {
-        "; the poses fit both equally well, so the probabilities are those before any was measured"
+        "; poses that are left out do not tell the two apart"
     } else {
         ""
     };

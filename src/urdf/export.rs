@@ -57,7 +57,8 @@ pub fn export_with_links(
     };
     let names = chain.joint_names();
     let with_tool = |path: &&Vec<usize>| path.contains(&problem.tool.joint);
-    let main = paths.iter().find(|path| moving(path) == names);
+    let is_main = |path: &&Vec<usize>| moving(path) == names;
+    let main = paths.iter().filter(with_tool).find(is_main).or_else(|| paths.iter().find(is_main));
     let Some(main) = main else {
         let declared = paths.iter().find(with_tool).or(paths.first());
         let expected = declared.map(|path| moving(path)).unwrap_or_default();
@@ -68,7 +69,7 @@ pub fn export_with_links(
     let main = Branch::new(chain, main, &nominal)?;
     main.write(&mut patches, arm);
     main.write_end(&mut patches, (&nominal, arm))?;
-    let others = paths.iter().filter(|path| **path != main.path);
+    let others = paths.iter().filter(|path| **path != main.path && !moving(path).is_empty());
     for path in others.clone() {
         branches.push((path, chain.branch(&moving(path))?));
     }

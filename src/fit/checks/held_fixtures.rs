@@ -1,6 +1,7 @@
 //! Check of the numbers of points, anchors and surfaces that the fit does not vary.
 
 use serde_json::json;
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::finding::{Finding, FindingCode};
 use super::row_kind::format_error;
@@ -13,6 +14,8 @@ use crate::quantity::format::{decimals, number};
 const MIN_CHI2: f64 = 2.0;
 /// Largest share of what exceeds the noise in χ² that a freed fixture leaves.
 const MAX_LEFT: f64 = 0.05;
+/// Largest probability of the fall of χ² by chance (F test).
+const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
 /// Maximum number of fixtures that are freed, each by itself.
 const MAX_FITTED: usize = 8;
 /// Smallest deviation of a freed number, in standard errors, at which the finding names it.
@@ -46,7 +49,12 @@ pub(in crate::fit) fn held_fixture(
         Some((fitted.reduced_chi2?, names, fitted))
     });
     let (after, names, fitted) = freed.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if after - 1.0 >= MAX_LEFT * (before - 1.0) {
+    let [all, left] = [found, &fitted].map(|of| of.coordinates.saturating_sub(of.unknowns.len()));
+    let [of_all, of_left] = [before * all as f64, after * left as f64];
+    let freed = all.saturating_sub(left) as f64;
+    let ratio = (of_all - of_left).max(0.0) / (freed * after);
+    let chance = FisherSnedecor::new(freed, left as f64).ok()?.sf(ratio);
+    if after - 1.0 >= MAX_LEFT * (before - 1.0) || chance > MAX_CHANCE_PROBABILITY {
         return None;
     }
     let is_off = |estimate: &&Estimate| {
@@ -71,7 +79,7 @@ pub(in crate::fit) fn held_fixture(
     let kind = rows.leading().kind();
     let [left, declared] = [&fitted, found].map(|of| of.fitted.identification.rms.norm);
     let text = format!(
-        "{}: with that the reduced χ² is {after:.2} instead of {before:.0}, and the rms error {} \
+        "{}: with that the reduced χ² is {after:.2} instead of {before:.2}, and the rms error {} \
          instead of {}",
         words.collect::<Vec<_>>().join(", "),
         format_error(kind, left, 3),
@@ -79,7 +87,8 @@ pub(in crate::fit) fn held_fixture(
     );
     let alike: Vec<&str> = off.iter().skip(1).map(|estimate| estimate.name.as_str()).collect();
     let numbers = [json!(first.name), json!(alike), declared.into(), left.into()];
-    let remedy =
-        format!("correct it, or free it in [parameters]: \"{}\" = {{ free = true }}", first.name);
+    let rules = off.iter().map(|estimate| format!("\"{}\" = {{ free = true }}", estimate.name));
+    let rules = rules.collect::<Vec<_>>().join(", ");
+    let remedy = format!("correct what is held, or free it in [parameters]: {rules}");
     Some(Finding::new(FindingCode::HeldParameter, numbers, text).with_remedy(remedy))
 }

@@ -130,8 +130,8 @@ pub(in crate::fit) fn lens_finding(
     Some(Finding::new(FindingCode::LensContradicted, numbers, text).with_remedy(remedy))
 }
 
-/// States what frees the intrinsics `names` in `[parameters]`: lines to delete that hold them, and
-/// lines to add for those that no line frees.
+/// States what frees the intrinsics `names` in `[parameters]`: lines that hold them and have to free
+/// them, and lines to add for those that no line names.
 fn freeing(problem: &Problem, names: &[String]) -> String {
     let rule =
         |name: &String| problem.parameters.iter().rev().find(|rule| matches(&rule.pattern, name));
@@ -141,12 +141,13 @@ fn freeing(problem: &Problem, names: &[String]) -> String {
     let mut lines: Vec<String> = Vec::new();
     for rule in held.into_iter().filter_map(rule) {
         let place = Location { key: None, excerpt: None, ..rule.location.clone() };
-        let line = format!("\"{}\" = {{ fixed = true }} ({place})", rule.pattern);
+        let line = format!("\"{}\" ({place})", rule.pattern);
         if !lines.contains(&line) {
             lines.push(line);
         }
     }
-    let delete = (!lines.is_empty()).then(|| format!("delete {}", lines.join(" and ")));
+    let delete =
+        (!lines.is_empty()).then(|| format!("write free = true for {}", lines.join(" and ")));
     let others: Vec<String> = others.into_iter().cloned().collect();
     let free = (!others.is_empty())
         .then(|| format!("free them in [parameters] ({})", rules_in_words(&others)));

@@ -142,7 +142,13 @@ impl Check for ReadAsMeant {
             "the error of {as_read} has no explanation yet; it would fall to {rest}, which is \
              still more than the declared σ, with {named}{more}"
         );
-        let remedy = "check that and what acts alike; the model may also lack something".to_owned();
-        vec![found(text).with_remedy(remedy)]
+        let finding = found(text);
+        let more = finding.remedy.split_once("; ").map_or("", |(_, more)| more);
+        let mut remedy =
+            "check that and what acts alike; the model may also lack something".to_owned();
+        if !more.is_empty() {
+            remedy = format!("{remedy}; {more}");
+        }
+        vec![finding.with_remedy(remedy)]
     }
 }

@@ -9,6 +9,7 @@ use super::row_kind::format_error;
 use crate::error::Location;
 use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
+use crate::problem::HeldOut;
 use crate::quantity::Unit;
 use crate::quantity::format::decimals;
 
@@ -31,7 +32,8 @@ impl Check for DataDecide {
         let numbers = [poses.into(), coordinates.into(), parameters.into()];
         let split = fit.fitting.split;
         let (fitted, held_out) = (split.identification.len(), split.held_out.len());
-        let remedy = if held_out > fitted {
+        let by_column = matches!(fit.problem.data.held_out, Some(HeldOut::Column(_)));
+        let remedy = if by_column && held_out > fitted {
             format!(
                 "{held_out} rows are held out and {fitted} are fitted: check whether the words that \
                  mark them are exchanged"

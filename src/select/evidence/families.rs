@@ -2,7 +2,7 @@
 //! probability is divided between families by their weights, and within a family by the shares of
 //! its members.
 
-use crate::problem::{Effect, Problem};
+use crate::problem::{Effect, Joint, JointKind, Problem};
 use crate::select::settings::{
     PRIOR_OF_FUNCTIONS, PRIOR_OF_INSTRUMENT_SCALE, PRIOR_OF_RIGID_LINKS,
 };
@@ -72,9 +72,11 @@ impl Families {
 pub(super) fn share(effect: &Effect, tries: f64, problem: &Problem) -> f64 {
     let slides = problem.slides();
     let sliding = slides.iter().filter(|slides| **slides).count();
+    let is_turning = |joint: &&Joint| joint.command_kind() == JointKind::Revolute;
+    let turning = problem.joints.iter().filter(is_turning).count();
     let weight = match *effect {
         Effect::GearRatio { joint } if slides.get(joint.wrapping_sub(1)) == Some(&true) => {
-            ((slides.len() - sliding) as f64 / sliding as f64).max(1.0)
+            (turning as f64 / sliding as f64).max(1.0)
         }
         _ => 1.0,
     };

@@ -88,7 +88,7 @@ pub(super) fn other_gravity(
     let (as_read, rest) = (error(declared), error(&best));
     let text = format!(
         "the measurements fit if gravity acts along another axis of the base: with {words} and {joints} {} giving way \
-         to the loads, the rms error would be {} mm; as declared it is {} mm, and no joint gives way so",
+         to the loads, the rms error would be {} mm; as declared it is {} mm",
         soft.join(", "),
         mm(rest, 3),
         mm(as_read, 3)

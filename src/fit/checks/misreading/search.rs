@@ -256,11 +256,11 @@ impl<'a> Trial<'a> {
     /// fit, best first.
     pub(super) fn explained(&self, chosen: &[Misreading], limit: f64) -> Vec<Explanation> {
         let explanation = |&misreading: &Misreading| {
-            let Outcome { rms, size, left_out, is_within_priors } =
-                self.outcome(misreading, true)?;
             if misreading.is_minute() {
                 return None;
             }
+            let Outcome { rms, size, left_out, is_within_priors } =
+                self.outcome(misreading, true)?;
             // A negative ratio means that the joint turns against its command, and one of 1 is no
             // misreading.
             let is_impossible = |size: f64| match misreading {
