@@ -1,5 +1,6 @@
 //! Names of a table's columns after the map of `[data.columns]` has been applied.
 
+use super::join_key::is_time;
 use super::meaning::{is_numbered_or_position, split_unit};
 use super::table::Table;
 use crate::error::{InputError, JOINED, TableErrorKind};
@@ -69,7 +70,9 @@ impl<'a> Names<'a> {
                 ColumnSelector::Name(name) => only_place(rule, name, table)?,
             };
             let Some(entry) = place.and_then(|place| of_place.get_mut(place)) else {
-                if !measured || has(&rule.ours) || is_given_otherwise(rule) {
+                // The join has used the clock of the joint table, which stands in no row.
+                let is_clock = table.appended_columns().is_some() && is_time(&rule.ours);
+                if !measured || has(&rule.ours) || is_given_otherwise(rule) || is_clock {
                     continue;
                 }
                 return Err(no_such(rule, rules, table));

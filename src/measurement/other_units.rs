@@ -41,8 +41,8 @@ const MAX_PLACEHOLDER_SHARE: f64 = 0.3;
 /// Minimum number of rows beside those with a placeholder.
 const MIN_OTHER_ROWS: usize = 4;
 /// Smallest distance of a placeholder from all other numbers, as a multiple of their range: for one
-/// of [`PLACEHOLDERS`] and a repeated 0, and for another repeated number.
-const MIN_PLACEHOLDER_RANGES: [f64; 2] = [3.0, 10.0];
+/// of [`PLACEHOLDERS`], for a repeated 0, and for another repeated number.
+const MIN_PLACEHOLDER_RANGES: [f64; 3] = [3.0, 2.0, 10.0];
 /// Maximum number of rows with a placeholder that a warning names after the first.
 const MAX_NAMED_ROWS: usize = 6;
 
@@ -250,9 +250,12 @@ fn placeholder_rows(values: &[f64], may_repeat: bool) -> Option<(Vec<usize>, [f6
         others.dedup();
         let is_known = PLACEHOLDERS.iter().any(|known| known.total_cmp(&value.abs()).is_eq());
         let repeats = may_repeat && rows.len() > 1 && 2 * others.len() > count;
-        let [usual, other] = MIN_PLACEHOLDER_RANGES;
-        let is_zero = value.abs().total_cmp(&0.0).is_eq();
-        let ranges = if is_known || is_zero { usual } else { other };
+        let [known, zero, other] = MIN_PLACEHOLDER_RANGES;
+        let ranges = match value.abs().total_cmp(&0.0).is_eq() {
+            _ if is_known => known,
+            true => zero,
+            false => other,
+        };
         let distance = (low - value).max(value - high);
         let is_rare = count >= MIN_OTHER_ROWS
             && rows.len() as f64 <= MAX_PLACEHOLDER_SHARE * values.len() as f64;
