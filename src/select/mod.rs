@@ -43,9 +43,9 @@ pub use rules::SelectionRules;
 #[doc(hidden)]
 pub use screening::examine;
 pub use screening::{Ranked, Trace, trace, trace_by};
-pub use selection::{
-    ClosedLoop, Compared, Found, Interval, Round, Status, Verdict, close, close_by,
-};
+#[doc(hidden)]
+pub use selection::Compared;
+pub use selection::{ClosedLoop, Found, Interval, Round, Status, Verdict, close, close_by};
 #[doc(hidden)]
 pub use separating_pose::SeparatingPose;
 #[doc(hidden)]

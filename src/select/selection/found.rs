@@ -50,6 +50,7 @@ pub struct Found {
     /// probability that it acts instead.
     pub alternatives: Vec<(Effect, f64)>,
     /// The most probable alternatives of a probable effect, each fitted in its place.
+    #[doc(hidden)]
     pub compared: Vec<Compared>,
     /// Quantities of a law that the search composed, with their ranges over the identification
     /// poses (SI, temperatures in °C); empty for other effects. Beyond these ranges the law is not
