@@ -43,8 +43,7 @@ impl AlternativeEffect {
         }
     }
 
-    /// Returns true if the poses do not tell this effect from the found one, so that their
-    /// probabilities are those before any pose was measured.
+    /// Returns true if poses that are left out do not tell this effect from the found one.
     pub(crate) fn is_undecided(&self) -> bool {
         self.ln_odds_of_poses.is_some_and(|odds| odds.abs() < MAX_UNDECIDED_LN_ODDS)
     }

@@ -351,8 +351,7 @@ fn bounds_of_commands_hold_whichever_effect_acts() {
     let written = serde_json::json!({ "problem": name, "effects": [found] });
     folder.write("loop.json", written.to_string());
     let both = folder.flexcal(command);
-    let said =
-        "did not decide whether the scale is off or, with 20 %, joint 1 is off: by the errors that these state";
+    let said = "did not decide whether the scale is off or, with 20 %, joint 1 is off: by";
     assert_contains(&both.stderr, &[said]);
     let bound = |run: &Run| run.json()["mean_bound_mm"].as_f64().unwrap();
     // The targets are some metres from the instrument, whose readings err by 1 mm per metre.
