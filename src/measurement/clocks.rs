@@ -150,16 +150,21 @@ fn shift_to(
 }
 
 /// Returns the warning that the arm moved at the times \[s\] of some measured rows, by a log that is
-/// continuous, with the `offset` of its clock with which the arm rests at all of them; `None` if it
+/// continuous, with the offset of its clock with which the arm rests at all of them; `None` if it
 /// rests at each, or if more rows than not are measured so and no other offset is certain.
+/// `best_shift` returns a shift \[s\] of the log, and its offset in words.
 pub(super) fn moving_arm(
     (times, rests): (&[f64], &[Rest]),
-    offset: impl FnOnce() -> Option<String>,
+    best_shift: impl FnOnce() -> Option<(f64, String)>,
     location: &Location,
 ) -> Option<Warning> {
-    let gaps = times.iter().filter_map(|&time| nearest_rest(rests, time));
-    let rows = gaps.filter(|(_, gap)| *gap > PAIR_GAP).count();
-    let offset = if rows > 1 { offset() } else { None };
+    let moving = |shift: f64| {
+        let gaps = times.iter().filter_map(|&time| nearest_rest(rests, time - shift));
+        gaps.filter(|(_, gap)| *gap > PAIR_GAP).count()
+    };
+    let rows = moving(0.0);
+    let shift = if rows > 1 { best_shift() } else { None };
+    let offset = shift.filter(|(shift, _)| moving(*shift) == 0).map(|(_, words)| words);
     let is_usual = 2 * rows > times.len() && offset.is_none();
     let kind = WarningKind::MovedAtTime { rows, of: times.len(), offset };
     (rows > 0 && !is_usual).then(|| Warning { location: location.clone(), kind })
@@ -266,6 +271,7 @@ mod tests {
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
         assert_eq!(zone_change(&late, &uneven), None);
     }
+
     #[test]
     fn the_clock_of_a_continuous_log_is_found_by_its_rests() {
         // The arm moves for 8 s, and rests for 7 to 22 s; twice a second a row is logged.
@@ -287,12 +293,27 @@ mod tests {
         let place = Location::file(std::path::Path::new("problem.toml"));
         let moved = |shift: f64| {
             let times: Vec<f64> = measured.iter().map(|time| time - shift).collect();
-            moving_arm((&times, &rests), || None, &place).map(|warning| warning.kind)
+            let best = || {
+                let shift = best_shift(&times, (&log, &rests), 0.5)?;
+                Some((shift, format!("{shift:.0}")))
+            };
+            moving_arm((&times, &rests), best, &place).map(|warning| warning.kind)
         };
         assert_eq!(moved(shift), None);
         assert!((shift - 3641.7).abs() < 3.0, "{shift}");
         let later = moved(shift + 3.0);
-        assert!(matches!(later, Some(WarningKind::MovedAtTime { rows: 1.., of: 40, .. })));
+        assert!(matches!(
+            later,
+            Some(WarningKind::MovedAtTime { rows: 2.., of: 40, offset: Some(_) })
+        ));
+        // With rows that are measured while the arm moves, no offset makes it rest at all of them.
+        let mut times: Vec<f64> = measured.iter().map(|time| time - shift).collect();
+        for (time, rest) in times.iter_mut().zip(&rests).take(3) {
+            *time = rest.first - 4.0;
+        }
+        let best = || Some((1.0, "1".to_owned()));
+        let kind = moving_arm((&times, &rests), best, &place).map(|warning| warning.kind);
+        assert_eq!(kind, Some(WarningKind::MovedAtTime { rows: 3, of: 40, offset: None }));
         // One row for each pose is no continuous log.
         let few = rows.iter().step_by(40).map(|(time, cells)| (*time, cells));
         assert_eq!(super::rests(few, Some(0)), []);

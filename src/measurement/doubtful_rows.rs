@@ -8,14 +8,12 @@ use nalgebra::Vector2;
 
 use super::Measurements;
 use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
-use crate::problem::{Joint, JointKind, Observation, Problem};
+use crate::problem::{FOCAL_X, Joint, JointKind, Observation, Problem};
 
 /// Smallest ratio of the farthest pixel to twice the centre of the image, along both axes, at which
 /// the intrinsics of a camera are those of another resolution. Centres of lenses are nearer to
 /// those of images.
 const MIN_PIXEL_REACH: f64 = 1.2;
-/// Place of the focal length among the numbers of a camera.
-const FOCAL_X: usize = 6;
 /// Minimum number of rows of pixels from which normalised image coordinates are recognised.
 const MIN_NORMALISED_ROWS: usize = 8;
 /// Largest absolute normalised image coordinate of usual lenses.

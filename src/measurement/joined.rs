@@ -304,11 +304,17 @@ impl JoinedLog {
     /// `None` if the tables are not joined by time or no offset is certain. Paired rows are close to
     /// each other, or within the tolerance of the problem if `is_tolerant`.
     fn offset(&self, is_tolerant: bool) -> Option<String> {
+        self.shift_and_offset(is_tolerant).map(|(_, offset)| offset)
+    }
+
+    /// Returns the shift of the log \[s\] with which the rows pair best, and the offset as
+    /// [`offset`](Self::offset) does.
+    fn shift_and_offset(&self, is_tolerant: bool) -> Option<(f64, String)> {
         let JoinRule::Time { offset, tolerance } = self.rule else { return None };
         let tolerance = if is_tolerant { tolerance } else { 0.0 };
         let shift = best_shift(&self.times, (&self.log_times, &self.rests), tolerance)?;
         let seconds = ((offset + shift) * 1e3).round() / 1e3;
-        Some(format!("{seconds:?}"))
+        Some((shift, format!("{seconds:?}")))
     }
 
     /// Returns the row of the log that is the partner of most measured rows because its time is the
@@ -478,7 +484,8 @@ impl JoinedLog {
         let others = unpaired.into_iter().flatten();
         let others = others.chain(jump.or_else(|| order_contradicted(&self.timed_pairs)));
         let moving = (&*self.times, &*self.rests);
-        let others = others.chain(moving_arm(moving, || self.offset(true), &self.location));
+        let shift = || self.shift_and_offset(true);
+        let others = others.chain(moving_arm(moving, shift, &self.location));
         Ok(self.text_warnings.iter().cloned().chain(others).collect())
     }
 }

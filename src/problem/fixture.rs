@@ -20,6 +20,13 @@ use crate::spatial::MAX_NORMAL_TILT;
 /// Standard deviation of a known distance if the file states none: one micrometre \[m\].
 const DEFAULT_DISTANCE_SIGMA: f64 = 1e-6;
 
+/// Index of the focal length along x in the numbers of a camera.
+pub(crate) const FOCAL_X: usize = 6;
+/// Index of the image centre along x in the numbers of a camera.
+pub(crate) const CENTRE_X: usize = 8;
+/// Index of the first coefficient of distortion in the numbers of a camera.
+pub(crate) const FIRST_COEFFICIENT: usize = 10;
+
 /// Object around the arm or on it, against which rows are measured. Its position may be declared or
 /// unknown.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::pattern::matches;
 use super::section::Section;
-use super::{Body, Effect, Fixture, Joint, JointKind, ParameterRule, Problem};
+use super::{Body, CENTRE_X, Effect, FOCAL_X, Fixture, Joint, JointKind, ParameterRule, Problem};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::observation::FixtureKind;
 use crate::quantity::format::{number, two_digits};
@@ -20,10 +20,6 @@ const MAX_LIMIT_TURNS: f64 = 6.0;
 /// Largest plausible distance of a fixture from the origin of the measuring frame, or between two
 /// points, as a multiple of the length of the arm's links.
 const MAX_FIXTURE_LINKS: f64 = 20.0;
-/// Index of the focal length along x in the numbers of a camera.
-const FOCAL_X: usize = 6;
-/// Index of the image centre along x in the numbers of a camera.
-const CENTRE_X: usize = 8;
 /// Smallest distance of the centre of a lens from the middle of its images, relative to their
 /// diagonal, at which its coordinates may be exchanged, and the largest one of usual lenses.
 const MIN_EXCHANGED_OFF: f64 = 0.15;

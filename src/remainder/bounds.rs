@@ -216,6 +216,7 @@ mod tests {
         assert!((test(50, 50).chance() - 1.0).abs() < 1e-12);
         assert!((test(41, 50).chance() - 0.0306).abs() < 1e-4);
     }
+
     #[test]
     fn bounds_hold_as_often_as_stated_if_another_effect_may_act() {
         // Errors are even between 0 and 1 mm, so that q(p) = p mm.

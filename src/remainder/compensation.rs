@@ -58,8 +58,8 @@ pub enum CompensationError {
 impl Compensation {
     /// Finds the commands for `targets`. Targets without positions are waypoints: the identified
     /// arm is brought to where the nominal arm would be with the same commands. `correction`
-    /// corrects predictions and bounds errors with probability `level`. The bounds hold whether the
-    /// declared effects or their `rivals` act.
+    /// corrects predictions and bounds errors with probability `level`. The bounds include what the
+    /// errors of the instrument differ by if `rivals` of declared effects act.
     ///
     /// # Errors
     /// Returns an error if a row is no position, the estimate is of another problem or lacks a base

@@ -13,7 +13,7 @@ use super::common::arms::{parse, path};
 use super::common::made::{draw, model_of};
 use super::{apart, problem_of, robot, tips};
 use flexcal::measurement::Dataset;
-use flexcal::problem::Problem;
+use flexcal::problem::{Joint, JointKind, Problem};
 
 /// Returns the text without the contents of its `<origin>`s, and without origins on separate lines.
 fn without_origins(text: &str) -> String {
@@ -26,6 +26,15 @@ fn without_origins(text: &str) -> String {
     lines.join("\n")
 }
 
+/// Returns random configurations, with 0 for fixed joints.
+fn configurations(problem: &Problem, count: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+    let mut value = |joint: &Joint| match joint.kind {
+        JointKind::Fixed => 0.0,
+        _ => rng.random_range(-2.0..2.0),
+    };
+    (0..count).map(|_| problem.joints.iter().map(&mut value).collect()).collect()
+}
+
 #[test]
 fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -34,14 +43,7 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     let mut problem = problem_of(&chain);
     // Every parameter is free, including base and tool.
     problem.parameters.retain(|rule| !matches!(rule.freedom, flexcal::problem::Freedom::Fixed));
-    let configurations: Vec<Vec<f64>> = (0..100)
-        .map(|_| {
-            let mut q: Vec<f64> =
-                problem.joints.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
-            (q[0], q[4], q[6]) = (0.0, 0.0, 0.0);
-            q
-        })
-        .collect();
+    let configurations = configurations(&problem, 100, &mut rng);
     let model = model_of(&problem, &Dataset::poses(&configurations).measurements().unwrap());
     let arm_only = |x: &DVector<f64>| {
         DVector::from_iterator(
@@ -184,14 +186,7 @@ fn cameras_and_markers_on_the_arm_become_links() {
     let described = describe(&chain).unwrap().text;
     let (before, after) = described.split_at(described.find("[parameters]").unwrap());
     let problem = parse(&format!("{before}{MOUNTED}{after}"));
-    let configurations: Vec<Vec<f64>> = (0..20)
-        .map(|_| {
-            let mut q: Vec<f64> =
-                problem.joints.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
-            (q[0], q[4], q[6]) = (0.0, 0.0, 0.0);
-            q
-        })
-        .collect();
+    let configurations = configurations(&problem, 20, &mut rng);
     let model = model_of(&problem, &Dataset::poses(&configurations).measurements().unwrap());
     let mut x = draw(&model, |_| 0.0, &mut rng);
     for (x, parameter) in x.iter_mut().zip(&model.parameters) {
@@ -271,14 +266,7 @@ fn every_branch_of_a_tree_is_exported() {
     let urdf = format!("<robot name=\"torso\">\n{}{joints}</robot>\n", link("pelvis"));
     let original = Robot::parse(&urdf, std::path::Path::new("torso.urdf")).unwrap();
     let chain = Chain::new(&original, Some("pelvis"), Some("right_hand")).unwrap();
-    let configurations: Vec<Vec<f64>> = (0..20)
-        .map(|_| {
-            let mut q: Vec<f64> =
-                problem.joints.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
-            (q[2], q[6]) = (0.0, 0.0);
-            q
-        })
-        .collect();
+    let configurations = configurations(&problem, 20, &mut rng);
     let model = model_of(&problem, &Dataset::poses(&configurations).measurements().unwrap());
     let mut x = draw(&model, |_| 0.0, &mut rng);
     for (x, parameter) in x.iter_mut().zip(&model.parameters) {

@@ -1,13 +1,13 @@
 //! Check of the numbers of points, anchors and surfaces that the fit does not vary.
 
 use serde_json::json;
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::finding::{Finding, FindingCode};
+use super::freed::Freed;
 use super::row_kind::format_error;
 use crate::fit::{Estimate, Identification, IdentifyError};
 use crate::measurement::Measurements;
-use crate::problem::{Fixture, ParameterRule, Problem};
+use crate::problem::{Fixture, Problem};
 use crate::quantity::format::{decimals, number};
 
 /// Smallest reduced χ² at which held fixtures are freed.
@@ -42,18 +42,11 @@ pub(in crate::fit) fn held_fixture(
         return None;
     }
     let freed = held.into_iter().filter_map(|names| {
-        let mut other = problem.clone();
-        let rules = names.iter().map(|name| ParameterRule::free(name.clone(), problem));
-        other.parameters.extend(rules);
-        let fitted = fit(&other).ok().filter(|fitted| fitted.termination.converged())?;
-        Some((fitted.reduced_chi2?, names, fitted))
+        let freed = Freed::new((problem, found), &names, &fit)?;
+        Some((names, freed))
     });
-    let (after, names, fitted) = freed.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let [all, left] = [found, &fitted].map(|of| of.coordinates.saturating_sub(of.unknowns.len()));
-    let [of_all, of_left] = [before * all as f64, after * left as f64];
-    let freed = all.saturating_sub(left) as f64;
-    let ratio = (of_all - of_left).max(0.0) / (freed * after);
-    let chance = FisherSnedecor::new(freed, left as f64).ok()?.sf(ratio);
+    let (names, Freed { fitted, reduced_chi2: after, chance, .. }) =
+        freed.min_by(|(_, a), (_, b)| a.reduced_chi2.total_cmp(&b.reduced_chi2))?;
     if after - 1.0 >= MAX_LEFT * (before - 1.0) || chance > MAX_CHANCE_PROBABILITY {
         return None;
     }

@@ -3,9 +3,9 @@
 
 use nalgebra::{Matrix6, Vector6};
 use serde_json::json;
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::finding::Finding;
+use super::freed::Freed;
 use super::view_order::views;
 use crate::error::Location;
 use crate::fit::{Estimate, FindingCode, Identification, IdentifyError, Placement};
@@ -13,7 +13,7 @@ use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::observation::Scene;
 use crate::problem::pattern::matches;
-use crate::problem::{Fixture, Freedom, ParameterRule, Problem};
+use crate::problem::{CENTRE_X, FIRST_COEFFICIENT, Fixture, Freedom, Problem};
 
 /// Largest p-value of the F test at which freeing the intrinsics improves the fit significantly.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
@@ -29,9 +29,6 @@ const MIN_GAIN_RATIO: f64 = 3.0;
 const REMAINING_SIGMAS: f64 = 2.0;
 /// Largest share of what exceeds the noise in χ² that another reading of the intrinsics leaves.
 const MAX_LEFT_BY_READING: f64 = 0.05;
-/// Places of the centre and of the first coefficient of distortion among the numbers of a camera.
-const CENTRE_X: usize = 8;
-const FIRST_COEFFICIENT: usize = 10;
 /// Smallest number of degrees of freedom within views that determines the noise of pixels: its
 /// relative standard error is then √(2/200) = 10 %.
 const MIN_NOISE_FREEDOM: f64 = 200.0;
@@ -75,15 +72,8 @@ pub(in crate::fit) fn lens_finding(
     if fixed.is_empty() {
         return None;
     }
-    let mut freed = problem.clone();
-    let rules = fixed.iter().map(|name| ParameterRule::free(name.clone(), problem));
-    freed.parameters.extend(rules);
-    let other = fit(&freed).ok().filter(|other| other.termination.converged())?;
-    let after = other.reduced_chi2?;
-    let count = other.unknowns.len().saturating_sub(found.unknowns.len()) as f64;
-    let freedom = other.coordinates.saturating_sub(other.unknowns.len()) as f64;
-    let gain = before * (freedom + count) - after * freedom;
-    let chance = FisherSnedecor::new(count, freedom).ok()?.sf(gain.max(0.0) / (count * after));
+    let Freed { problem: freed, fitted: other, reduced_chi2: after, freedom, gain, chance } =
+        Freed::new((problem, found), &fixed, &fit)?;
     if chance > MAX_CHANCE_PROBABILITY {
         return None;
     }
@@ -146,12 +136,12 @@ fn freeing(problem: &Problem, names: &[String]) -> String {
             lines.push(line);
         }
     }
-    let delete =
+    let change =
         (!lines.is_empty()).then(|| format!("write free = true for {}", lines.join(" and ")));
     let others: Vec<String> = others.into_iter().cloned().collect();
     let free = (!others.is_empty())
         .then(|| format!("free them in [parameters] ({})", rules_in_words(&others)));
-    delete.into_iter().chain(free).collect::<Vec<_>>().join("; ")
+    change.into_iter().chain(free).collect::<Vec<_>>().join("; ")
 }
 
 /// Returns the words of the other reading of the intrinsics of a camera with which the images fit

@@ -14,6 +14,7 @@ mod doubted_rows;
 pub(super) mod finding;
 pub(super) mod fitted_rows;
 mod followed_commands;
+mod freed;
 pub(super) mod held_fixtures;
 pub(super) mod held_out;
 mod held_parameters;

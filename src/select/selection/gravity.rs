@@ -29,7 +29,7 @@ const MAX_NEGATIVE_SIGMAS: f64 = 3.0;
 ///
 /// For each direction, the effects of the `end` of the search are fitted again, with a compliance
 /// of every joint in place of composed laws. Left-out poses must be predicted far better than by the
-/// same with the declared gravity, and no worse than by the end of the search. A joint that gives
+/// same with the declared gravity, and not clearly worse than by the end of the search. A joint that gives
 /// way against its load shows a wrong direction.
 pub(super) fn other_gravity(
     state: &SearchState,
