@@ -19,23 +19,47 @@ const COMPLIANCES: [f64; 2] = [1.6e-5, 3.6e-5];
 
 /// Returns an arm of four joints, two of which give way, with a forearm of `mass` kilograms.
 fn arm(mass: f64) -> Problem {
-    parse(&format!(
+    parse(&text(mass))
+}
+
+/// Returns the same arm with stiffnesses of the joints in place of compliances as effects.
+fn arm_with_stiffnesses() -> Problem {
+    let text = text(5.2);
+    let mut text = text
+        .split("[[effect]]")
+        .next()
+        .unwrap()
+        .replace("[parameters]", "[parameters]\n'joint*.stiffness' = { sigma_relative = 0.3 }");
+    for (alpha, compliance) in ["a_m = 0.1\n", "a_m = 0.6\n"].into_iter().zip(COMPLIANCES) {
+        let stiffness = 1.0 / compliance;
+        text = text.replace(alpha, &format!("{alpha}stiffness_N_m_per_rad = {stiffness}\n"));
+    }
+    parse(&text)
+}
+
+/// Returns the text of [`arm`].
+fn text(mass: f64) -> String {
+    format!(
         "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = -90\na_m = 0.1\n[[joint.body]]\nname = 'upper'\n\
          mass_kg = 8\ncom_m = [0.3, 0, 0]\n[[joint]]\na_m = 0.6\n[[joint.body]]\nname = 'fore'\nmass_kg = {mass:?}\n\
          com_m = [0.25, 0, 0]\n[[joint]]\na_m = 0.5\nalpha_deg = 90\n[tool]\ntarget_m = [0.1, 0.05, 0.1]\npayload_at = 'target'\n\
          [parameters]\n'joint*.theta' = {{ sigma_deg = 0.3 }}\n'joint*.a' = {{ sigma_mm = 1 }}\n\
          'base.*' = {{ free = true }}\n[data]\nposition_sigma_mm = 0.04\n[[effect]]\njoint-compliance = {{ joint = 2 }}\n\
          [[effect]]\njoint-compliance = {{ joint = 3 }}\n"
-    ))
+    )
 }
 
 /// Returns measurements of an arm with a forearm of 5.2 kg.
 fn measured() -> Dataset {
-    let truth = arm(5.2);
+    measurements_of(&arm(5.2))
+}
+
+/// Returns measurements of a true arm, with its compliances as effects, if it has any.
+fn measurements_of(truth: &Problem) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    let mut rows = at_random(&truth, 2 * ROWS, 1.2, &mut rng);
+    let mut rows = at_random(truth, 2 * ROWS, 1.2, &mut rng);
     rows.payload = Some((0..rows.len()).map(|row| [0.0, 4.0, 8.0][row % 3]).collect());
-    let model = model_of(&truth, &rows);
+    let model = model_of(truth, &rows);
     let value = |name: &str| match name {
         "joint-compliance[2].compliance" => COMPLIANCES[0],
         "joint-compliance[3].compliance" => COMPLIANCES[1],
@@ -45,7 +69,7 @@ fn measured() -> Dataset {
         model.parameters.len(),
         model.parameters.iter().map(|parameter| value(&parameter.name)),
     );
-    measure(&truth, &mut rows, &x, SIGMA, &mut rng);
+    measure(truth, &mut rows, &x, SIGMA, &mut rng);
     divided(ROWS, &rows)
 }
 
@@ -112,4 +136,19 @@ fn payloads_of_the_next_row_are_named() {
     let finding = found.finding(FindingCode::Misread);
     let words = finding.unwrap_or_else(|| panic!("{:?}", found.findings)).to_string();
     assert!(words.contains("payloads that belong to the configuration 1 row before"), "{words}");
+}
+
+#[test]
+fn gravity_of_the_wrong_sign_is_named_where_stiffnesses_are_declared() {
+    let truth = arm_with_stiffnesses();
+    let data = measurements_of(&truth);
+    assert!(!fit_as_command(&truth, &data).has(FindingCode::Misread));
+    for axis in [2, 0] {
+        let mut wrong = truth.clone();
+        wrong.gravity = nalgebra::Vector3::ith(axis, 9.80665);
+        let found = fit_as_command(&wrong, &data);
+        let finding = found.finding(FindingCode::Misread);
+        let words = finding.unwrap_or_else(|| panic!("{:?}", found.findings)).to_string();
+        assert!(words.contains("gravity that points along −z"), "{words}");
+    }
 }

@@ -508,4 +508,5 @@ fn an_arm_that_bends_against_its_load_is_named() {
     let finding = found.finding(FindingCode::GivesWayUpwards).unwrap();
     assert_eq!(finding.word("parameter"), Some("joint-compliance[2].compliance"));
     assert!((finding.number("compliance").unwrap() + 4e-5).abs() < 2e-6, "{finding}");
+    assert!(finding.remedy.contains("write gravity_m_s2 = [0, 0, -9.80665]"), "{finding}");
 }

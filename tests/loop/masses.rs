@@ -3,12 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use flexcal::fit::Options;
+use flexcal::fit::{FindingCode, Options};
 use flexcal::measurement::{Dataset, Split};
-use flexcal::problem::Problem;
+use flexcal::problem::{Effect, Problem};
 use flexcal::rig::{Truth, simulate};
 use flexcal::select::{Status, Verdict, close};
 use flexcal::study::table;
+use nalgebra::Vector3;
 
 const POSES: &str = "[random]\n'joint*.*' = { sigma_deg = 0.05, sigma_mm = 0.5, sigma_relative = 0.1 }\n\
     'tool.*' = { sigma_mm = 1 }\n[noise]\nposition_sigma_mm = 0.05\n[poses]\nq1_deg = [-160, 160]\n\
@@ -33,5 +34,40 @@ fn wrong_masses_and_a_payload_elsewhere_are_named() {
             closure.effects.iter().map(|found| (found.effect.name(), found.status)).collect();
         assert_eq!(found, [(name, Status::Found)]);
         assert_eq!(closure.verdict, Verdict::Explained);
+    }
+}
+
+/// Arm of three joints with masses, rigid as declared, that hangs on a wall: −x of its base is down.
+const ON_A_WALL: &str = "name = 'wall'\ngravity_m_s2 = [-9.80665, 0, 0]\n\
+    [[joint]]\nd_m = 0.5\n\
+    [[joint]]\nalpha_deg = -90\na_m = 0.15\nbody = [{ mass_kg = 48, com_m = [0.4, 0.05, 0.1] }]\n\
+    [[joint]]\na_m = 0.85\nbody = [{ mass_kg = 30, com_m = [0.3, 0.1, -0.05] }]\n\
+    [tool]\ntarget_m = [0.7, 0.03, 0.14]\n[parameters]\n'joint*.*' = { sigma_deg = 0.3, sigma_mm = 2 }\n\
+    'base.*' = { free = true }\n[data]\nposition_sigma_mm = 0.05\nheld_out = { fraction = 0.3, seed = 1 }\n";
+
+#[test]
+fn gravity_of_the_wrong_sign_or_along_another_axis_is_named() {
+    let mut problem = Problem::parse(ON_A_WALL, Path::new("problem.toml")).unwrap();
+    let along_x = problem.gravity;
+    let truth = "[[effect]]\njoint-compliance = { joint = 2 }\ncompliance_rad_per_N_m = 1e-6\n\
+        [random]\n'joint*.*' = { sigma_deg = 0.05, sigma_mm = 0.5 }\n[noise]\nposition_sigma_mm = 0.05\n\
+        [poses]\nq1_deg = [-160, 160]\nq2_deg = [-150, -10]\nq3_deg = [-80, 150]\n";
+    let truth = Truth::parse(truth, Path::new("TRUTH.toml"), &problem).unwrap();
+    let rows = simulate(&problem, &truth, 44, 5).unwrap().rows;
+    let split = Split { identification: (0..32).collect(), held_out: (32..44).collect() };
+    let data = Dataset::new(table(&rows), split);
+    let mut closed = |gravity: Vector3<f64>| {
+        problem.gravity = gravity;
+        close(&problem, &data, &Options::default()).unwrap()
+    };
+    let right = closed(along_x);
+    assert_eq!(right.verdict, Verdict::Explained);
+    assert_eq!(right.effects[0].effect, Effect::JointCompliance { joint: 2 });
+    for other in [-along_x, Vector3::z() * along_x.x] {
+        let wrong = closed(other);
+        let said = wrong.after.finding(FindingCode::Misread).map(ToString::to_string);
+        let expected = "with gravity_m_s2 = [-9.80665, 0, 0] and joint 2 giving way";
+        assert!(said.as_ref().is_some_and(|said| said.contains(expected)), "{said:?}");
+        assert_eq!(wrong.verdict, Verdict::Unexplained);
     }
 }

@@ -65,10 +65,8 @@ impl Check for ReadAsMeant {
         let explanations = if is_near {
             let Some(most_left) = most_left else { return Vec::new() };
             fit.misread_masses(most_left)
-        } else if let Some(most_left) =
-            most_left.filter(|_| is_within_priors && fit.explanations().fitted.is_empty())
-        {
-            of_masses = misread_masses(fit, most_left);
+        } else if let Some(most_left) = most_left.filter(|_| fit.explanations().fitted.is_empty()) {
+            of_masses = misread_masses(fit, most_left, is_within_priors);
             &of_masses
         } else {
             fit.explanations()

@@ -274,7 +274,10 @@ impl Check for GivesWayToLoads {
                 .then_some((parameter, compliance, sigmas))
         };
         let unknowns = fit.whole.unknowns.iter().enumerate();
-        let worst = unknowns.filter_map(of_unknown).max_by(|a, b| a.2.total_cmp(&b.2));
+        let tested: Vec<(&Parameter, f64, f64)> = unknowns.filter_map(of_unknown).collect();
+        let worst = tested.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2));
+        // Gravity the other way turns the sign of every compliance.
+        let is_opposite = tested.iter().all(|(_, _, sigmas)| *sigmas > -MAX_NEGATIVE_SIGMAS);
         let finding = |(parameter, compliance, sigmas): (&Parameter, f64, f64)| {
             let name = &parameter.name;
             let text = format!(
@@ -283,7 +286,21 @@ impl Check for GivesWayToLoads {
                 compliance * 1e6
             );
             let numbers = [name.as_str().into(), compliance.into(), sigmas.into()];
-            Finding::new(FindingCode::GivesWayUpwards, numbers, text)
+            let finding = Finding::new(FindingCode::GivesWayUpwards, numbers, text);
+            let gravity = fit.problem.gravity;
+            if !is_opposite || gravity.norm() == 0.0 {
+                return finding;
+            }
+            // Adding 0 leaves no negative zero.
+            let axes: Vec<String> =
+                gravity.iter().map(|axis| (0.0 - axis + 0.0).to_string()).collect();
+            let remedy = format!(
+                "if the arm hangs from a ceiling, or the sign of gravity is wrong, write \
+                 gravity_m_s2 = [{}], with which it bends under its load; otherwise check the \
+                 places of masses and payload, and whether a spring, counterweight or hoist is missing",
+                axes.join(", ")
+            );
+            finding.with_remedy(remedy)
         };
         worst
             .filter(|(_, _, sigmas)| *sigmas > MAX_NEGATIVE_SIGMAS)

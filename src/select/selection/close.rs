@@ -234,8 +234,11 @@ pub fn close_by(
     let mut with_orientations = fitted.problem.clone();
     with_orientations.data.fits_orientation = problem.data.fits_orientation;
     let orientations = orientation_finding(&with_orientations, &data, &unstoppable);
-    let is_open = verdict == Verdict::Unexplained && !interrupted;
+    // A formula of the moments fits an arm that gives way under another gravity as well.
+    let has_formula = state.added(&fitted).iter().any(Effect::is_composed);
+    let is_open = (verdict == Verdict::Unexplained || has_formula) && !interrupted;
     let gravity = is_open.then(|| other_gravity(&state, &declared, &fitted)).flatten();
+    let verdict = if gravity.is_some() { Verdict::Unexplained } else { verdict };
     let mut after = fitted.found;
     after.findings.splice(0..0, orientations.into_iter().chain(gravity));
     if !interrupted {

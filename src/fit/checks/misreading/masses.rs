@@ -10,7 +10,7 @@ use crate::numeric::parallel;
 
 /// Maximum number of rows, evenly spaced, by which the misreadings are ranked.
 const MAX_RANKED_ROWS: usize = 40;
-/// Number of solver steps, from the fit as read, by which they are ranked.
+/// Number of solver steps by which they are ranked.
 const RANKING_STEPS: u64 = 2;
 /// Maximum number of misreadings that are fitted in full.
 const MAX_FITTED: usize = 4;
@@ -19,14 +19,21 @@ impl CheckedFit<'_> {
     /// Returns the masses in another unit or at another place that leave at most `limit` \[m\]. For a
     /// fit near the noise, they replace the other misreadings.
     pub fn misread_masses(&self, limit: f64) -> &Explanations {
-        self.explanations.get_or_init(|| misread_masses(self, limit))
+        self.explanations.get_or_init(|| misread_masses(self, limit, true))
     }
 }
 
 /// Finds the masses in another unit or at another place that leave at most `limit` \[m\] after a full
 /// fit, where the fit as declared leaves more than noise. An arm that gives way hides such a mistake
 /// in other parameters, so that the nominal arm does not show it.
-pub(in crate::fit) fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
+///
+/// The misreadings are ranked by steps from the end of the fit, or from the registered nominal arm
+/// if the fit is not `within_priors`: a fit to the wrong loads may end far from the arm.
+pub(in crate::fit) fn misread_masses(
+    fit: &CheckedFit,
+    limit: f64,
+    within_priors: bool,
+) -> Explanations {
     let gives_way =
         fit.fitting.model.parameters.iter().any(|parameter| parameter.site.is_elastic());
     if !gives_way && !fit.problem.is_elastic() {
@@ -40,15 +47,19 @@ pub(in crate::fit) fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanatio
     let has_payloads = measurements.payload.is_some();
     let shifts = [-1, 1].map(|by| Misreading::ShiftedPayload { by });
     tested.extend(shifts.into_iter().filter(|_| has_payloads));
-    let (few, start) = (Trial::with_rows(fit, MAX_RANKED_ROWS), &fit.end.x);
+    let (few, end) = (Trial::with_rows(fit, MAX_RANKED_ROWS), &fit.end.x);
     let error = |&misreading: &Misreading| {
         let error = few.with_corrected(misreading, false, |fitting, _| {
             let steps = Some(RANKING_STEPS);
             let fitting = Fitting { max_steps: steps, ..fitting.with_declared_noise() };
-            if fitting.model.parameters.len() != start.len() {
+            if fitting.model.parameters.len() != end.len() {
                 return None;
             }
-            let end = fitting.run(start).ok()?;
+            let end = if within_priors {
+                fitting.run(end).ok()?
+            } else {
+                fitting.run(&fitting.registered().ok()?).ok()?
+            };
             Some(few.penalised(&fitting, &fitting.split.identification, &end.x))
         })?;
         error.is_finite().then_some((misreading, error))
