@@ -114,11 +114,16 @@ impl Watch {
     /// Returns the error of left-out rows with the named cause updated \[m\] or \[rad\], if it is so
     /// much larger than expected that something else has changed or drifted, instead or as well.
     pub fn unexplained_error(&self) -> Option<f64> {
-        let left = self.named()?.left_out_error?;
+        let cause = self.named()?;
+        let left = cause.left_out_error?;
         let coordinates = self.chi2.1;
         let chi2 = ChiSquared::new(coordinates).ok()?.inverse_cdf(1.0 - MAX_UNEXPLAINED_CHANCE);
         let ratio = (chi2 / coordinates).sqrt().max(MIN_UNEXPLAINED_RATIO);
-        (left > ratio * self.expected_error).then_some(left)
+        // Each left-out row is predicted with p changes that the n other coordinates determine, which
+        // multiplies its variance by n / (n − p) on average.
+        let kept = (coordinates - cause.changes.len() as f64).max(0.0);
+        let expected = (coordinates / kept).sqrt() * self.expected_error;
+        (left > ratio * expected).then_some(left)
     }
 }
 
