@@ -156,7 +156,11 @@ pub enum WarningKind {
     #[error(
         "the time falls by {back} s here{} ({}); rows are used in the order of their times",
         additional_rows(*rows),
-        if *is_midnight { "through midnight? add 86400 s from this row on" } else { "two series?" }
+        match (*is_midnight, *rows) {
+            (true, 1) => "through midnight? add 86400 s from this row on",
+            (true, _) => "through midnight? add 86400 s from this row on, and as much again from each further one",
+            (false, _) => "two series?",
+        }
     )]
     TimeGoesBack { rows: usize, back: String, is_midnight: bool },
     #[error(

@@ -112,7 +112,7 @@ impl Measurements {
         let kind = WarningKind::TimeGoesBack {
             rows: back.len(),
             back: format!("{by:.3}"),
-            is_midnight: MIDNIGHT_STEPS.contains(&by),
+            is_midnight: back.iter().all(|(_, by)| MIDNIGHT_STEPS.contains(by)),
         };
         Some(Warning { location: self.location(row), kind })
     }
