@@ -106,29 +106,12 @@ pub fn report_fit_once(fit: &Identification, (quiet, prints_text): (bool, bool))
     Outcome::NotMet
 }
 
-/// Findings that name a mistake in the table or the problem.
-const MISTAKES: [FindingCode; 4] = [
-    FindingCode::Misread,
-    FindingCode::ViewsReversed,
-    FindingCode::ColumnDoubted,
-    FindingCode::RowsDoubted,
-];
-/// Findings that follow from such a mistake, and are not printed beside it.
-const CONSEQUENCES: [FindingCode; 5] = [
-    FindingCode::SigmaOverstated,
-    FindingCode::HeldOutOutliers,
-    FindingCode::HeldOutBeyondPrediction,
-    FindingCode::HeldOutNotBetter,
-    FindingCode::RowsSetAside,
-];
-
 /// Prints the warnings of a fit, except the one that it is not trusted. Those that a named mistake
 /// explains stand in the result and the report alone.
 fn print_cautions(fit: &Identification) {
-    let names_mistake = MISTAKES.iter().any(|code| fit.has(*code));
     let is_shown = |caution: &&Finding| {
         (fit.is_trusted() || caution.code != FindingCode::PriorsDecide)
-            && !(names_mistake && CONSEQUENCES.contains(&caution.code))
+            && !fit.is_consequence(caution)
     };
     fit.cautions().filter(is_shown).for_each(|caution| warn(&caution.to_string()));
 }

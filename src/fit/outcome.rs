@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::fit::checks::finding::{Finding, FindingCode, MISTAKES, Severity};
+use crate::fit::checks::finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, Severity};
 use crate::fit::checks::misreading::MisreadEffect;
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::NoiseModel;
@@ -208,6 +208,12 @@ impl Identification {
     /// Returns true if a finding names a mistake of the input.
     pub(crate) fn names_mistake(&self) -> bool {
         MISTAKES.iter().any(|code| self.has(*code))
+    }
+
+    /// Returns true if another finding names a mistake of the input from which this one follows.
+    #[doc(hidden)]
+    pub fn is_consequence(&self, finding: &Finding) -> bool {
+        self.names_mistake() && CONSEQUENCES.contains(&finding.code)
     }
 
     /// Returns the first finding with the code `code`; `None` if no check reported it.

@@ -37,6 +37,21 @@ pub(in crate::fit) const MISTAKES: [FindingCode; 7] = [
     FindingCode::ScaleContradicted,
 ];
 
+/// Codes of findings that follow from a mistake of the input. Their usual remedies apply only without
+/// one, and commands do not print them beside it.
+pub(in crate::fit) const CONSEQUENCES: [FindingCode; 10] = [
+    FindingCode::PriorContradicted,
+    FindingCode::PriorWidth,
+    FindingCode::NoiseBeyondDeclared,
+    FindingCode::ResidualBeyondDeclared,
+    FindingCode::SigmaOverstated,
+    FindingCode::HeldOutWorse,
+    FindingCode::HeldOutBeyondPrediction,
+    FindingCode::HeldOutNotBetter,
+    FindingCode::HeldOutOutliers,
+    FindingCode::RowsSetAside,
+];
+
 /// Description of a finding code, one row of the table in `docs/findings.md`.
 #[derive(Debug, Clone, Copy)]
 pub struct FindingEntry {

@@ -46,7 +46,7 @@ mod view_order;
 use serde_json::Value;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
-use finding::{Finding, FindingCode, MISTAKES, OF_MISFIT};
+use finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, OF_MISFIT};
 
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
 /// print the first finding that is an error as the reason.
@@ -112,19 +112,6 @@ const OF_TABLE: [FindingCode; 4] = [
     FindingCode::ColumnDoubted,
     FindingCode::RowsDoubted,
     FindingCode::LimitContradicted,
-];
-
-/// Codes of findings that follow from a mistake of the input, and whose usual remedies apply only
-/// without one.
-const CONSEQUENCES: [FindingCode; 8] = [
-    FindingCode::PriorContradicted,
-    FindingCode::PriorWidth,
-    FindingCode::NoiseBeyondDeclared,
-    FindingCode::ResidualBeyondDeclared,
-    FindingCode::HeldOutWorse,
-    FindingCode::HeldOutBeyondPrediction,
-    FindingCode::HeldOutNotBetter,
-    FindingCode::HeldOutOutliers,
 ];
 
 /// Codes of findings that a strategy causes which leaves out the elasticity, or stops before all
