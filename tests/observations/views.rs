@@ -79,6 +79,25 @@ fn a_lens_is_contradicted_only_if_it_is_wrong() {
     }
 }
 
+/// A joint that errs leaves more than a wrong lens, but only the lens distorts an image.
+#[test]
+fn a_wrong_lens_is_named_beside_an_error_of_the_arm() {
+    let bench = CameraBench::new();
+    let found = |to: &str| {
+        let held = parse(&bench.text.replace("distortion = [0, 0, 0, 0, 0]", to));
+        let model = model_of(&bench.problem, &bench.rows);
+        let mut rows = measured_with(&model, &bench.rows, &bench.fitted.x, (1.0, 9));
+        for configuration in rows.configurations.chunks_mut(rows.joints) {
+            configuration[1] += 0.004 * (2.0 * configuration[1]).sin();
+        }
+        identify(&held, &split(&held, rows), &Options::default()).unwrap()
+    };
+    let right = found("distortion = [0, 0, 0, 0, 0]");
+    assert!(right.reduced_chi2.unwrap() > 1.5 && !right.has(FindingCode::LensContradicted));
+    let wrong = found("distortion = [0.02, 0, 0, 0, 0]");
+    assert!(wrong.has(FindingCode::LensContradicted), "{:?}", wrong.findings);
+}
+
 /// The points of an image determine no more than the pose of the board, whatever their number.
 #[test]
 fn a_few_images_are_not_judged_by_the_number_of_their_points() {

@@ -3,6 +3,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 use serde_json::json;
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::finding::Finding;
 use super::freed::Freed;
@@ -36,7 +37,8 @@ const MIN_NOISE_FREEDOM: f64 = 200.0;
 /// Compares the fit `found` with one whose intrinsics are free: focal lengths, image centres and
 /// distortion. Returns a finding if errors of the intrinsics cause most of the misfit.
 ///
-/// This requires two conditions. By an F test, the decrease of χ² by the freed parameters is larger
+/// Within the views, no error of the arm acts: there, free intrinsics show their errors whatever else
+/// is wrong ([`is_shown_within_views`]). Otherwise this requires two conditions. By an F test, the decrease of χ² by the freed parameters is larger
 /// than noise explains. The decrease is also several times the misfit that remains beyond the noise
 /// of pixels. Otherwise the arm or a marker may be the cause, and free intrinsics only absorb a
 /// part of their error. The noise of pixels is that within views ([`noise_within_views`]), or else
@@ -74,13 +76,16 @@ pub(in crate::fit) fn lens_finding(
     }
     let Freed { problem: freed, fitted: other, reduced_chi2: after, freedom, gain, chance } =
         Freed::new((problem, found), &fixed, &fit)?;
-    if chance > MAX_CHANCE_PROBABILITY {
-        return None;
-    }
-    let (noise, within) = noise_within_views(&freed, data, &other).unwrap_or((1.0, 0.0));
+    let of_views = noise_within_views(&freed, data, &other);
+    let (noise, within) = of_views.unwrap_or((1.0, 0.0));
     let by_chance = REMAINING_SIGMAS * noise * (2.0 * (freedom - within).max(0.0)).sqrt();
     let remaining = (after - noise) * freedom - by_chance;
-    if gain <= MIN_GAIN_RATIO * remaining {
+    let explains = chance <= MAX_CHANCE_PROBABILITY && gain > MIN_GAIN_RATIO * remaining;
+    let before_within = noise_within_views(problem, data, found).map(|(noise, _)| noise);
+    let shown = before_within.zip(of_views).filter(|&(before, (after, freedom))| {
+        is_shown_within_views((before, after), freedom, fixed.len() as f64)
+    });
+    if !explains && shown.is_none() {
         return None;
     }
     let sigmas = |estimate: &Estimate| {
@@ -101,11 +106,17 @@ pub(in crate::fit) fn lens_finding(
         format!("{chance:.0e}")
     };
     let names: Vec<&str> = off.iter().map(|estimate| estimate.name.as_str()).collect();
-    let text = format!(
-        "the intrinsics are not as declared: with {} the reduced χ² falls from {before:.3} to {after:.3}, \
-         by chance with probability {chance}",
-        words.collect::<Vec<_>>().join(", ")
-    );
+    let words = words.collect::<Vec<_>>().join(", ");
+    let text = match shown.filter(|_| !explains) {
+        Some((before, (after, _))) => format!(
+            "the intrinsics are not as declared: with {words} the reduced χ² within the views, \
+             where no error of the arm acts, falls from {before:.3} to {after:.3}; the arm errs as well"
+        ),
+        None => format!(
+            "the intrinsics are not as declared: with {words} the reduced χ² falls from {before:.3} to \
+             {after:.3}, by chance with probability {chance}"
+        ),
+    };
     if let Some((words, after)) = other_lens(problem, before, &fit) {
         let text = format!(
             "the intrinsics are not as declared: with {words} the reduced χ² falls from \
@@ -208,6 +219,18 @@ fn rules_in_words(names: &[String]) -> String {
     kinds.dedup();
     let rules = kinds.iter().map(|kind| format!("\"camera*.{kind}*\" = {{ free = true }}"));
     rules.collect::<Vec<_>>().join(", ")
+}
+
+/// Returns true if `count` freed intrinsics cause the fall of the reduced χ² within views, which has
+/// `freedom` degrees of freedom: chance does not, and no more than a third of it is left beyond the
+/// declared noise, as an error of the marker would leave.
+fn is_shown_within_views((before, after): (f64, f64), freedom: f64, count: f64) -> bool {
+    let gain = (before - after) * freedom;
+    let left = (after - 1.0) * freedom - REMAINING_SIGMAS * (2.0 * freedom).sqrt();
+    let ratio = gain.max(0.0) / (count * after);
+    let test = FisherSnedecor::new(count, (freedom - count).max(1.0));
+    let chance = test.map_or(1.0, |test| test.sf(ratio));
+    chance <= MAX_CHANCE_PROBABILITY && gain > MIN_GAIN_RATIO * left
 }
 
 /// Returns the noise variance of pixels within views, relative to the declared one, and the degrees
