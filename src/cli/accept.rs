@@ -139,7 +139,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else if verdict == Some(Verdict::Undecided.as_str()) {
             "measure and hold out more poses, then the same command again".to_owned()
         } else if found.cautions().next().is_some() {
-            format!("read the warnings in {}, then print and sign it", page.display())
+            let (named, page) = (common.problem_arguments(), page.display());
+            format!(
+                "clear up the warnings first (flexcal identify {named} says how); print and sign \
+                 {page} only if they do not matter here"
+            )
         } else {
             format!("print {} and sign it", page.display())
         };

@@ -218,6 +218,12 @@ pub fn after_loop(
              widen those that may be wrong"
         );
     }
+    if result.is_contradicted() {
+        return format!(
+            "look at the rows that the warnings name before anything is applied; if they are \
+             right, flexcal trace {named} ranks further candidates"
+        );
+    }
     // A plan can distinguish two effects if the ranges of the poses are known, and if the effects
     // do not depend on time.
     let doubted = result.effects.iter().filter(|found| found.is_doubted());

@@ -244,7 +244,8 @@ impl LoopResult {
 
     /// Returns true if held-out rows, or rows that a robust loss sets aside, contradict the last
     /// fit.
-    pub(crate) fn is_contradicted(&self) -> bool {
+    #[doc(hidden)]
+    pub fn is_contradicted(&self) -> bool {
         let codes = [FindingCode::HeldOutBeyondPrediction, FindingCode::RowsSetAside];
         self.findings.iter().any(|finding| codes.contains(&finding.code))
     }
