@@ -196,7 +196,11 @@ fn fit_rows(
         earlier: options.earlier.as_deref(),
     };
     if let Some(error) = fitting.unpredictable() {
-        let error = with_readings(&fitting, problem, problem.with_soft_joint(error));
+        let error = with_readings(
+            &fitting,
+            problem,
+            problem.with_soft_joint(error, measurements.largest_payload()),
+        );
         return Err(error.into());
     }
     let unknowns = fitted_parameters(&fitting)?;

@@ -147,6 +147,11 @@ impl Measurements {
         is_missing.then(|| self.warning(0, "payload_kg", kind))
     }
 
+    /// Returns the largest payload of the rows \[kg\]; 0 without a column of payloads.
+    pub(crate) fn largest_payload(&self) -> f64 {
+        self.payload.iter().flatten().copied().fold(0.0, f64::max)
+    }
+
     /// Returns a warning, located at the heaviest payload, if that is implausible for the arm.
     pub(super) fn heavy_payload(&self, problem: &Problem) -> Option<Warning> {
         let payloads = self.payload.iter().flatten().enumerate();

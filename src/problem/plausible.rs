@@ -128,6 +128,16 @@ const MIN_DOWNWARD_COSINE: f64 = 0.7;
 /// Largest plausible distance of a centre of mass from the frame of its joint \[m\].
 const MAX_BODY_DISTANCE: f64 = 10.0;
 
+impl Joint {
+    /// Returns the names and masses \[kg\] of the link of the joint and of the bodies on it.
+    fn named_masses(&self) -> impl Iterator<Item = (&str, f64)> {
+        let beam = self.beam.iter();
+        let carried = beam.clone().flat_map(|beam| &beam.masses).chain(&self.bodies);
+        let carried = carried.map(|body| (body.name.as_str(), body.mass));
+        carried.chain(beam.map(|beam| (beam.name.as_str(), beam.mass)))
+    }
+}
+
 impl Problem {
     /// Returns warnings about values of the arm that are probably in another unit or convention.
     #[doc(hidden)]
@@ -233,31 +243,40 @@ impl Problem {
 
     /// Returns the error of a pose without equilibrium with the name of the mass that is probably
     /// too heavy, or of the joint that is probably too soft; returns any other error as it is.
-    pub(crate) fn with_soft_joint(&self, error: InputError) -> InputError {
+    /// `payload` is the largest payload of the rows \[kg\].
+    pub(crate) fn with_soft_joint(&self, error: InputError, payload: f64) -> InputError {
         match *error.kind {
             InputErrorKind::NoEquilibrium => {
-                let kind = self.heavy_mass_error().or_else(|| self.soft_joint_error());
+                let kind = self.heavy_body_error().or_else(|| self.heavy_mass_error(payload));
+                let kind = kind.or_else(|| self.soft_joint_error());
                 error.location.error(kind.unwrap_or(InputErrorKind::NoEquilibrium))
             }
             kind => error.location.error(kind),
         }
     }
 
+    /// Returns an error that names the first part of an arm that is too heavy to be one, and counts
+    /// the others.
+    fn heavy_body_error(&self) -> Option<InputErrorKind> {
+        let masses = self.joints.iter().flat_map(Joint::named_masses);
+        let mut heavy = masses.filter(|(_, mass)| *mass > MAX_BODY_MASS);
+        let (name, mass) = heavy.next()?;
+        Some(InputErrorKind::HeavyBody {
+            name: name.to_owned(),
+            mass: two_digits(mass, 3),
+            others: heavy.count(),
+        })
+    }
+
     /// Returns an error that names the mass that is more than [`MAX_MASS_RATIO`] times as heavy as
-    /// all others together.
-    fn heavy_mass_error(&self) -> Option<InputErrorKind> {
-        let of_joint = |joint: &'_ Joint| {
-            let beam = joint.beam.iter();
-            let carried = beam.clone().flat_map(|beam| &beam.masses).chain(&joint.bodies);
-            let carried = carried.map(|body| (body.name.clone(), body.mass));
-            carried.chain(beam.map(|beam| (beam.name.clone(), beam.mass))).collect::<Vec<_>>()
-        };
-        let masses: Vec<(String, f64)> = self.joints.iter().flat_map(of_joint).collect();
-        let (name, mass) = masses.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let ratio = mass / (self.declared_mass() - mass);
+    /// all others together, the payload of `payload` kg among them.
+    fn heavy_mass_error(&self, payload: f64) -> Option<InputErrorKind> {
+        let masses = self.joints.iter().flat_map(Joint::named_masses).chain([("payload", payload)]);
+        let (name, mass) = masses.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let ratio = mass / (self.declared_mass() + payload - mass);
         (ratio.is_finite() && ratio > MAX_MASS_RATIO).then(|| InputErrorKind::HeavyMass {
-            name: name.clone(),
-            mass: two_digits(*mass, 3),
+            name: name.to_owned(),
+            mass: two_digits(mass, 3),
             ratio: two_digits(ratio, 0),
         })
     }

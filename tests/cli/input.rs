@@ -206,6 +206,14 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
             |b| b.edit(PROBLEM, "5.2e4", "1.0"),
             &["a-none.csv:2", "equilibrium", "joint 2 (./problem.toml:13) may be too soft"],
         ),
+        (
+            "masses in grams",
+            |b| {
+                b.edit(PROBLEM, "mass_kg = ", "mass_kg = 10000");
+                b.edit(PROBLEM, "5.2e4", "1.0");
+            },
+            &["equilibrium", "kg", "if these are grams, divide by 1000"],
+        ),
     ];
     for (what, spoil, expected) in mistakes {
         let folder = Folder::with_lunar_sampler();

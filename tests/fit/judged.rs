@@ -87,6 +87,28 @@ fn poses_that_say_little_about_others_are_named() {
 }
 
 #[test]
+fn names_of_targets_that_are_exchanged_are_named() {
+    let targets = |places: [[f64; 3]; 2]| {
+        let words = ["A", "B"].into_iter().zip(places);
+        let words = words.map(|(name, at)| format!("[[target]]\nname = '{name}'\nat_m = {at:?}\n"));
+        let tool = "[tool]\ntarget_m = [0.05, 0.02, 0.12]\n";
+        parse(&text(PRIORS).replace(tool, &words.collect::<String>()))
+    };
+    let [first, second] = [[0.05, 0.02, 0.12], [-0.06, 0.04, 0.08]];
+    let (mounted, declared) = (targets([first, second]), targets([second, first]));
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let mut rows = of_targets(&mounted, at_random(&mounted, 90, 2.0, &mut rng));
+    let truth = draw(&model_of(&mounted, &rows), |_| 5e-4, &mut rng);
+    measure(&mounted, &mut rows, &truth, SIGMA, &mut rng);
+    let data = divided(60, &rows);
+    assert!(fit(&mounted, &data).is_trusted());
+    let found = fit(&declared, &data);
+    let finding = found.finding(FindingCode::BeyondPrior).unwrap();
+    assert!(finding.to_string().contains("each is fitted where the other one is"), "{finding}");
+    assert!(finding.remedy.starts_with("exchange \""), "{finding}");
+}
+
+#[test]
 fn held_out_rows_are_judged() {
     let problem = arm(PRIORS);
     let clean = measured(&problem, 1);

@@ -230,6 +230,8 @@ fn gross_mistakes_are_fitted_and_named() {
     data.measurements.positions.iter_mut().for_each(|at| *at += Vector3::new(0.4, -0.2, 0.1));
     let held = misread(&problem, &data);
     assert!(held.contains("a base that stands elsewhere than declared"), "{held}");
+    let signs = declared(&|problem| problem.joints.iter_mut().for_each(|joint| joint.a *= -1.0));
+    assert!(signs.contains("a of all joints that has the other sign"), "{signs}");
     let long = declared(&|problem| problem.joints[3].d *= 1e3);
     assert!(long.contains("lengths of joints that are in millimetres"), "{long}");
     // Rows of a standard table: a and α of a joint belong to the next one.

@@ -7,7 +7,7 @@ use super::checked_fit::CheckedFit;
 use super::row_kind::format_error;
 use crate::error::Location;
 use crate::model::parameter::{Parameter, ParameterSite};
-use crate::problem::{Joint, JointKind, Problem};
+use crate::problem::{Joint, JointKind, Problem, Target};
 use crate::quantity::Unit;
 
 /// Largest rms residual of the fit, as a fraction of the displacement that the deviation of one
@@ -46,7 +46,45 @@ pub(super) fn contradicted_entry(
     deviation: (&Parameter, f64),
     is_far: impl Fn(&Parameter, f64) -> bool,
 ) -> Option<ContradictedEntry> {
-    single_entry(fit, deviation, is_far).or_else(|| freed_target(fit))
+    single_entry(fit, deviation, is_far)
+        .or_else(|| exchanged_targets(fit, deviation.0))
+        .or_else(|| freed_target(fit))
+}
+
+/// Returns the entry of the target of `parameter` if it is fitted where another target of the same
+/// joint is declared, and that one where this target is declared.
+fn exchanged_targets(fit: &CheckedFit, parameter: &Parameter) -> Option<ContradictedEntry> {
+    let ParameterSite::Target { target, axis: 0..3 } = parameter.site else { return None };
+    let names = &fit.fitting.placement.targets;
+    // The targets of the rows have another order than those of the problem.
+    let declared = |name: &String| fit.problem.targets.iter().find(|target| target.name == *name);
+    let fitted = |target: usize| {
+        let declared = declared(names.get(target)?)?;
+        let mut place = declared.at;
+        for (parameter, x) in fit.fitting.model.parameters.iter().zip(&fit.end.x) {
+            match parameter.site {
+                ParameterSite::Target { target: of, axis } if of == target && axis < 3 => {
+                    place[axis] += x;
+                }
+                _ => (),
+            }
+        }
+        Some((declared, place))
+    };
+    let (first, place) = fitted(target)?;
+    let others = (0..names.len()).filter(|&other| other != target).filter_map(fitted);
+    let is_exchanged = |(other, of_other): &(&Target, Vector3<f64>)| {
+        let limit = MAX_TARGET_MISMATCH * (first.at - other.at).norm();
+        first.joint == other.joint
+            && (place - other.at).norm() < limit
+            && (of_other - first.at).norm() < limit
+    };
+    let (other, _) = others.into_iter().find(is_exchanged)?;
+    let names = format!("\"{}\" and \"{}\"", first.name, other.name);
+    Some(ContradictedEntry {
+        words: format!("of the targets {names}, each is fitted where the other one is declared"),
+        remedy: format!("exchange {names} in the column target, or in [[target]]"),
+    })
 }
 
 /// Returns the declared target if a fit without its prior explains the measurements and leaves all

@@ -209,6 +209,13 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
             .count()
     };
     let long: usize = problem.joints.iter().map(count_long).sum();
+    for field in [A, D] {
+        let is_set = |joint: &&Joint| {
+            number_of(&mut (*joint).clone(), field).is_some_and(|length| *length != 0.0)
+        };
+        let is_of_several = problem.joints.iter().filter(is_set).count() > 1;
+        forms.extend(is_of_several.then_some(Misreading::Sign { joint: 0, field }));
+    }
     for (joint, declared) in (1..).zip(&problem.joints) {
         for field in [A, D, JointField::X, JointField::Y, JointField::Z] {
             let mut declared = declared.clone();
