@@ -129,6 +129,15 @@ pub fn after_fit(
             "declare the place of the payload in {file} as the warning says, then flexcal \
              identify {named}"
         ),
+        // A σ in another unit, or loads that the table lacks.
+        None if found
+            .finding(FindingCode::NoiseBeyondDeclared)
+            .is_some_and(|noise| !noise.remedy.contains("flexcal")) =>
+        {
+            format!(
+                "correct the table or {file} as the warning says, then flexcal identify {named}"
+            )
+        }
         None if found.has(FindingCode::StrategyMisfit)
             || found.has(FindingCode::NoiseBeyondDeclared) =>
         {

@@ -136,15 +136,19 @@ impl Measurements {
         is_coarse.then(|| Warning { location: self.location(rows[0]), kind })
     }
 
-    /// Returns a warning if the problem declares the place of a payload but no mass, and the table
-    /// has no column of payloads.
-    pub(super) fn missing_payload(&self, problem: &Problem) -> Option<Warning> {
-        let is_missing = self.payload.is_none()
+    /// Returns true if the problem declares the place of a payload but no mass, and the table has no
+    /// column of payloads.
+    pub(crate) fn lacks_payload(&self, problem: &Problem) -> bool {
+        self.payload.is_none()
             && problem.tool.payload_is_declared
             && problem.tool.payload_mass == 0.0
-            && problem.is_elastic();
+            && problem.is_elastic()
+    }
+
+    /// Returns a warning if the table [lacks payloads](Self::lacks_payload).
+    pub(super) fn missing_payload(&self, problem: &Problem) -> Option<Warning> {
         let kind = WarningKind::NoPayloadColumn { mass: problem.tool.payload_mass.to_string() };
-        is_missing.then(|| self.warning(0, "payload_kg", kind))
+        self.lacks_payload(problem).then(|| self.warning(0, "payload_kg", kind))
     }
 
     /// Returns the largest payload of the rows \[kg\]; 0 without a column of payloads.

@@ -106,7 +106,9 @@ pub(super) fn joint_names(problem: &Problem, words: &str) -> Option<String> {
     if !named.iter().any(|joint| joint.2 || holds_other(joint)) {
         return None;
     }
-    let mentioned = named.iter().filter(|(number, ..)| is_mentioned(*number));
+    let mentioned = named
+        .iter()
+        .filter(|(number, name, _)| *name != format!("joint {number}") && is_mentioned(*number));
     let mentioned: Vec<String> =
         mentioned.map(|(number, name, _)| format!("joint {number} is {name}")).collect();
     (!mentioned.is_empty()).then(|| format!("In the problem {}.", mentioned.join(", ")))

@@ -71,3 +71,22 @@ fn gravity_of_the_wrong_sign_or_along_another_axis_is_named() {
         assert_eq!(wrong.verdict, Verdict::Unexplained);
     }
 }
+
+#[test]
+fn a_compliance_under_a_payload_alone_is_found_and_no_error_of_the_payload() {
+    let text = ON_A_WALL
+        .replace("body = [{ mass_kg = 48, com_m = [0.4, 0.05, 0.1] }]\n", "\n")
+        .replace("body = [{ mass_kg = 30, com_m = [0.3, 0.1, -0.05] }]\n", "\n")
+        .replace("[tool]\n", "[tool]\npayload_kg = 10\npayload_at_m = [0.7, 0, 0.1]\n");
+    let problem = Problem::parse(&text, Path::new("problem.toml")).unwrap();
+    let truth = "[[effect]]\njoint-compliance = { joint = 3 }\ncompliance_rad_per_N_m = 1e-5\n\
+        [random]\n'joint*.*' = { sigma_deg = 0.05, sigma_mm = 0.5 }\n[noise]\nposition_sigma_mm = 0.05\n\
+        [poses]\nq1_deg = [-160, 160]\nq2_deg = [-150, -10]\nq3_deg = [-80, 150]\n";
+    let truth = Truth::parse(truth, Path::new("TRUTH.toml"), &problem).unwrap();
+    let rows = simulate(&problem, &truth, 44, 5).unwrap().rows;
+    let split = Split { identification: (0..32).collect(), held_out: (32..44).collect() };
+    let closure = close(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap();
+    // The arm moves in too few ways for a certain law.
+    let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
+    assert_eq!(found, [&Effect::JointCompliance { joint: 3 }]);
+}

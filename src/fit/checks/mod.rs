@@ -261,12 +261,16 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
     let has = |codes: &[FindingCode]| findings.iter().any(|found| codes.contains(&found.code));
     let (is_far_off, is_beyond_noise) = (has(&FAR_OFF), has(&BEYOND_NOISE));
     let has_cause = has(&[FindingCode::RowsSetAside]);
+    let is_beyond_prior = has(&[FindingCode::BeyondPrior]);
     for finding in findings {
         // Remedies that name a cause stay.
         if finding.remedy != finding.code.entry().remedy {
             continue;
         }
         let remedy = match finding.code {
+            FindingCode::HeldOutBeyondPrediction if is_beyond_prior => {
+                "follow first what another finding (beyond-prior) says"
+            }
             FindingCode::HeldOutWorse
             | FindingCode::HeldOutNotBetter
             | FindingCode::HeldOutOutliers

@@ -117,6 +117,10 @@ impl Check for NoiseIsDeclared {
         let finding = Finding::new(FindingCode::NoiseBeyondDeclared, numbers, text);
         vec![if UNIT_RATIOS.contains(&ratio) {
             finding.with_remedy("the declared σ may be in another unit: check it".to_owned())
+        } else if fit.fitting.measurements.lacks_payload(fit.problem) {
+            let remedy = "the table has no column payload_kg, although [tool] says where a payload \
+                          hangs: add the column, or remove payload_at";
+            finding.with_remedy(remedy.to_owned())
         } else {
             let kind = fit.fitting.measurements.leading().kind();
             finding.with_remedy(format!(
