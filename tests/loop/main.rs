@@ -5,7 +5,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-mod agreement;
 mod cases;
 mod checks;
 mod command;
