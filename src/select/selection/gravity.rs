@@ -1,11 +1,13 @@
 //! Gravity along another axis of the base than the problem declares, where joints that give way to
 //! loads would explain what is left.
 
+use std::cell::OnceCell;
+
 use nalgebra::Vector3;
 use serde_json::json;
 
 use super::state::SearchState;
-use crate::fit::{Finding, FindingCode};
+use crate::fit::{Finding, FindingCode, Options};
 use crate::problem::{Effect, Problem};
 use crate::quantity::format::mm;
 use crate::select::candidates::Candidates;
@@ -30,7 +32,8 @@ const MAX_NEGATIVE_SIGMAS: f64 = 3.0;
 /// For each direction, the effects of the `end` of the search are fitted again, with a compliance
 /// of every joint in place of composed laws. Left-out poses must be predicted far better than by the
 /// same with the declared gravity, and not clearly worse than by the end of the search. A joint that gives
-/// way against its load shows a wrong direction.
+/// way against its load shows a wrong direction. Provisional fits show which directions need a
+/// complete one.
 pub(super) fn other_gravity(
     state: &SearchState,
     declared: &Fitted,
@@ -47,23 +50,28 @@ pub(super) fn other_gravity(
         return None;
     }
     effects.extend(compliances.iter().cloned());
-    let with = |gravity: Vector3<f64>| {
+    let with = |gravity: Vector3<f64>, provisional: bool| {
         let problem = Problem { gravity, ..state.problem(declared, &effects) };
         let options = declared.warm_started_options(state.options, true);
-        declared.fit_other(problem, data, &options).ok()
+        declared.fit_other(problem, data, &Options { provisional, ..options }).ok()
+    };
+    let ln_odds = |fitted: &Fitted, known: &Fitted| {
+        let gain = LeftOutGain::new(fitted, known, data)?;
+        let odds = gain.ln_odds(fitted.sigma);
+        (gain.is_significant() && odds > LN_ODDS_OF_FORMULAS).then_some(odds)
     };
     let as_declared = declared.problem.gravity;
-    let known = with(as_declared)?;
+    let (provisional, known) = (with(as_declared, true)?, OnceCell::new());
+    let known = || known.get_or_init(|| with(as_declared, false)).as_ref();
     let directions = (0..3).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]);
     let trials = directions.filter_map(|(axis, sign)| {
         let gravity = Vector3::ith(axis, sign * as_declared.norm());
         if gravity.dot(&as_declared) > SAME_DIRECTION * as_declared.norm_squared() {
             return None;
         }
-        let fitted = with(gravity)?;
-        let gain = LeftOutGain::new(&fitted, &known, data)?;
-        let odds = gain.ln_odds(fitted.sigma);
-        (gain.is_significant() && odds > LN_ODDS_OF_FORMULAS).then_some((odds, gravity, fitted))
+        ln_odds(&with(gravity, true)?, &provisional)?;
+        let fitted = with(gravity, false)?;
+        Some((ln_odds(&fitted, known()?)?, gravity, fitted))
     });
     let (_, gravity, best) = trials.max_by(|one, other| one.0.total_cmp(&other.0))?;
     let against = LeftOutGain::new(end, &best, data)?.ln_odds(best.sigma.min(end.sigma));
