@@ -2,11 +2,13 @@
 
 use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
-use super::kernel::{add_product, factor_in_place};
-use super::product::{lower_product, product_with_lower};
+use super::kernel::{add_product, factor_in_place, invert_lower};
+use super::product::product_with_lower;
 
 /// Largest number of rows for which a triangular solve or inverse proceeds column by column.
 const MAX_UNBLOCKED_ROWS: usize = 24;
+/// Number of rows of a triangle that are multiplied together.
+const ROWS_PER_PRODUCT: usize = 96;
 /// Number of columns that the Cholesky factorisation treats as one block (panel).
 const PANEL_COLUMNS: usize = 64;
 
@@ -66,24 +68,50 @@ fn solve_right(lower: &DMatrix<f64>, right: &mut DMatrixViewMut<f64>) {
 }
 
 /// Returns the inverse L⁻¹ of a lower triangle L without zeros on its diagonal.
+pub(crate) fn inverse_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut inverse = DMatrix::zeros(lower.nrows(), lower.nrows());
+    invert_part(lower, &mut inverse, 0, lower.nrows());
+    inverse
+}
+
+/// Writes the inverse of the `count` rows and columns of a lower triangle from index `first` on to
+/// the same place of `inverse`, which is zero there.
 ///
 /// With L = (F 0 ; B G), W = F⁻¹ and X = G⁻¹: L⁻¹ = (W 0 ; −X B W, X).
-pub(crate) fn inverse_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = lower.nrows();
-    if n <= MAX_UNBLOCKED_ROWS {
-        let mut inverse = DMatrix::identity(n, n);
-        lower.solve_lower_triangular_mut(&mut inverse);
-        return inverse;
+fn invert_part(lower: &DMatrix<f64>, inverse: &mut DMatrix<f64>, first: usize, count: usize) {
+    if count <= MAX_UNBLOCKED_ROWS {
+        let n = lower.nrows();
+        return invert_lower((lower.as_slice(), n), (first, count), inverse.as_mut_slice());
     }
-    let (half, other) = (n / 2, n - n / 2);
-    let first = inverse_lower(&lower.view((0, 0), (half, half)).into_owned());
-    let last = inverse_lower(&lower.view((half, half), (other, other)).into_owned());
-    let below = product_with_lower(&lower.view((half, 0), (other, half)).into_owned(), &first);
-    let mut inverse = DMatrix::zeros(n, n);
-    inverse.view_mut((half, 0), (other, half)).copy_from(&-lower_product(&last, &below));
-    inverse.view_mut((0, 0), (half, half)).copy_from(&first);
-    inverse.view_mut((half, half), (other, other)).copy_from(&last);
-    inverse
+    let (half, other) = (count / 2, count - count / 2);
+    let middle = first + half;
+    invert_part(lower, inverse, first, half);
+    invert_part(lower, inverse, middle, other);
+    let below = product_with_lower(
+        &part(lower, (middle, first), (other, half)),
+        &part(inverse, (first, first), (half, half)),
+    );
+    let last = part(inverse, (middle, middle), (other, other));
+    for row in (0..other).step_by(ROWS_PER_PRODUCT) {
+        let end = other.min(row + ROWS_PER_PRODUCT);
+        inverse.view_mut((middle + row, first), (end - row, half)).gemm(
+            -1.0,
+            &last.view((row, 0), (end - row, end)),
+            &below.rows(0, end),
+            0.0,
+        );
+    }
+}
+
+/// Returns a copy of the part of a matrix that begins at row `i` and column `j`. Whole columns are
+/// copied, which is faster than entry by entry.
+fn part(matrix: &DMatrix<f64>, (i, j): (usize, usize), (rows, n): (usize, usize)) -> DMatrix<f64> {
+    let mut entries = Vec::with_capacity(rows * n);
+    let columns = matrix.as_slice().chunks_exact(matrix.nrows()).skip(j).take(n);
+    for column in columns {
+        entries.extend_from_slice(&column[i..i + rows]);
+    }
+    DMatrix::from_vec(rows, n, entries)
 }
 
 /// Returns the inverse L⁻¹ of the Cholesky factor of M = L Lᵀ, or `None` if M is not positive
@@ -110,7 +138,7 @@ mod tests {
 
     #[test]
     fn blocked_results_equal_those_column_by_column() {
-        for n in [1, 7, 24, 25, 130] {
+        for n in [1, 7, 24, 25, 130, 301] {
             let a = DMatrix::from_fn(n + 3, n, |i, j| {
                 ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0
             });

@@ -205,6 +205,44 @@ pub(crate) fn factor_in_place(n: usize, entries: &mut [f64]) -> bool {
     true
 }
 
+/// Writes the inverse of the `count` rows and columns of a lower triangle from index `first` on to
+/// the same place of `inverse`, which is zero there. Both matrices are stored column by column with
+/// `n` rows.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(crate) fn invert_lower(
+    (lower, n): (&[f64], usize),
+    (first, count): (usize, usize),
+    inverse: &mut [f64],
+) {
+    for j in 0..count {
+        let x = &mut inverse[(first + j) * n + first..][..count];
+        x[j] = 1.0;
+        for k in j..count {
+            let left = &lower[(first + k) * n + first + k..][..count - k];
+            let (solved, rest) = x[k..].split_at_mut(1);
+            solved[0] /= left[0];
+            let factor = solved[0];
+            rest.iter_mut().zip(&left[1..]).for_each(|(x, entry)| *x -= factor * entry);
+        }
+    }
+}
+
+/// Replaces the Gram matrix G of a few columns by G − YᵀY. The columns of Y are stored one after
+/// the other in `along`.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(crate) fn subtract_few_products(gram: &mut [f64], along: &[f64], count: usize) {
+    let rows = along.len() / count.max(1);
+    for j in 0..count {
+        for i in 0..=j {
+            let product = dot(&along[i * rows..][..rows], &along[j * rows..][..rows]);
+            gram[j * count + i] -= product;
+            if i < j {
+                gram[i * count + j] -= product;
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,9 +5,11 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::kernel::{Hyperparameters, embedded, matern, position_covariances, squared_distances};
+use super::kernel::{Hyperparameters, embedded, squared_distances};
+use super::pairs::{Levers, PairColumn, add_products, sum_of_products};
 use super::prior::ParameterPrior;
 use super::rows::{AXES, InputSource, Inputs, Rows, SiteFunctions};
+use crate::numeric::kernel::add_product;
 use crate::numeric::parallel;
 use crate::numeric::{
     gram, gram_of_lower, inverse_lower, lower_factor, product_with_lower, product_with_upper,
@@ -26,6 +28,9 @@ const LENGTH_BOUNDS: (f64, f64) = (-3.912_023, 2.079_441_5);
 const AMPLITUDE_BOUNDS: (f64, f64) = (-7.0, 2.0);
 /// Bounds of ln σ and ln σ_c, relative to ln(root mean square length of a residual).
 pub(super) const NOISE_BOUNDS: (f64, f64) = (-4.0, 2.0);
+/// Largest root mean square motion by 1 σ of a parameter, relative to the root mean square length of
+/// a residual, at which the prior of the parameter is narrow.
+const MAX_NARROW_MOTION: f64 = 10.0;
 /// Initial values of σ and σ_c in the search, as fractions of the root mean square length of a
 /// residual. σ is the noise of a coordinate, σ_c the noise that the rows of one configuration
 /// share.
@@ -37,15 +42,18 @@ pub(super) const NOISE_STARTS: [f64; 2] = [0.7, 0.3];
 /// The model is r = J δ + f + ε with δ ~ N(m, S), f ~ GP(0, K_f) and ε ~ N(0, N). With y = r − J m,
 /// C = K_f + N and K = C + J S Jᵀ, the value is ½ yᵀK⁻¹y + ½ ln det K.
 ///
-/// J S Jᵀ is never formed. With H = I + S½JᵀC⁻¹J S½, K⁻¹ = C⁻¹ − C⁻¹J S½ H⁻¹ S½JᵀC⁻¹ and det K =
-/// det C det H.
+/// Of J S Jᵀ, only the part of parameters whose prior allows small motions is formed and added to C.
+/// That of the others would take digits from C. With their columns in J and H = I + S½JᵀC⁻¹J S½,
+/// K⁻¹ = C⁻¹ − C⁻¹J S½ H⁻¹ S½JᵀC⁻¹ and det K = det C det H.
 pub(super) struct MarginalLikelihood<'a> {
     rows: &'a Rows,
     inputs: &'a Inputs,
     /// Vector y = r − J m: residuals at the mean of the parameters' prior.
     target: DVector<f64>,
-    /// Transpose of the scaled Jacobian J S½.
+    /// Transpose of the scaled Jacobian J S½ of the parameters with a wide prior.
     scaled_transposed: DMatrix<f64>,
+    /// Covariance J S Jᵀ by the parameters with a narrow prior (see [`MAX_NARROW_MOTION`]).
+    by_parameters: DMatrix<f64>,
     /// For each amplitude, the kind of function and the sites that it scales. All constants share
     /// one amplitude.
     amplitudes: Vec<(Function, Vec<usize>)>,
@@ -55,9 +63,10 @@ pub(super) struct MarginalLikelihood<'a> {
     shares_noise: bool,
     /// Logarithm of the root mean square length of a residual in m.
     size: f64,
-    /// For each row, its squared distances to itself and to all later rows: one number per input
-    /// for the first pair, then for the next one.
+    /// For each row, its squared distances to itself and to all later rows: one number per pair for
+    /// the first input, then for the next one.
     distances: Vec<Vec<f64>>,
+    levers: Levers,
 }
 
 /// Kind of error function at a site: of its own command, of all inputs, or constant.
@@ -66,17 +75,6 @@ enum Function {
     Single,
     Joint,
     Constant,
-}
-
-/// Correlations of the error functions between one row and itself, and between it and each later
-/// row; each of these is a pair.
-struct PairColumn {
-    /// For each pair and site j, the correlation of the function uⱼ of the site's own command, and
-    /// its derivative with respect to ln ℓᵤⱼ.
-    single: Vec<(f64, f64)>,
-    /// Correlation of the functions vⱼ of all inputs for each pair, and its derivative with respect
-    /// to −½ d². d is the distance of both rows in units of the lengths ℓᵥ.
-    joint: Vec<(f64, f64)>,
 }
 
 impl<'a> MarginalLikelihood<'a> {
@@ -102,21 +100,32 @@ impl<'a> MarginalLikelihood<'a> {
         let width = embedded.nrows();
         let of_row = |row: usize| &embedded.as_slice()[width * row..width * (row + 1)];
         let behind = |first: usize| {
-            let pairs = first..rows.len();
-            pairs.flat_map(|second| squared_distances(of_row(first), of_row(second))).collect()
+            let count = rows.len() - first;
+            let mut distances = vec![0.0; width / 2 * count];
+            for pair in 0..count {
+                let squares = squared_distances(of_row(first), of_row(first + pair));
+                squares.enumerate().for_each(|(k, square)| distances[k * count + pair] = square);
+            }
+            distances
         };
         let distances = parallel::map(rows.len(), behind);
-        let (size, scaled_transposed) = (size.ln(), scaled.transpose());
+        let most = (MAX_NARROW_MOTION * size).powi(2) * rows.len() as f64;
+        let (narrow, wide): (Vec<usize>, Vec<usize>) =
+            (0..scaled.ncols()).partition(|&j| scaled.column(j).norm_squared() <= most);
+        let by_parameters = gram(&scaled.select_columns(&narrow).transpose());
+        let (size, scaled_transposed) = (size.ln(), scaled.select_columns(&wide).transpose());
         Some(Self {
             rows,
             inputs,
             target,
             scaled_transposed,
+            by_parameters,
             amplitudes,
             singles,
             shares_noise,
             size,
             distances,
+            levers: Levers::new(rows),
         })
     }
 
@@ -208,6 +217,7 @@ impl<'a> MarginalLikelihood<'a> {
         let hyper = self.hyperparameters(logarithms);
         let (mut matrix, pairs) = self.covariance(&hyper);
         self.add_noise(&hyper, &mut matrix);
+        matrix += &self.by_parameters;
         let lower = lower_factor(matrix)?;
         let log_det_c = 2.0 * lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let inverse = inverse_lower(&lower);
@@ -255,34 +265,36 @@ impl<'a> MarginalLikelihood<'a> {
         let mut matrix = DMatrix::zeros(AXES * n, AXES * n);
         let column = |(first, out): (usize, &mut [f64])| {
             let count = n - first;
-            let mut pairs = PairColumn {
-                single: vec![(0.0, 0.0); sites * count],
-                joint: Vec::with_capacity(count),
-            };
-            let mut covariances = vec![0.0; sites];
-            for (pair, second) in (first..n).enumerate() {
-                let squared = &self.distances[first][width * pair..width * (pair + 1)];
-                let sum = squared.iter().zip(&joint).map(|(squared, scale)| squared * scale).sum();
-                let shared = matern(sum);
-                pairs.joint.push(shared);
-                for (site, covariance) in covariances.iter_mut().enumerate() {
-                    *covariance =
-                        hyper.joint[site].powi(2) * shared.0 + hyper.constant[site].powi(2);
-                    if let Some(input) = self.inputs.sites[site].single {
-                        let scaled = squared[input] * single[site];
-                        let (correlation, slope) = matern(scaled);
-                        pairs.single[sites * pair + site] = (correlation, slope * scaled);
-                        *covariance += hyper.single[site].powi(2) * correlation;
-                    }
+            let distances = |input: usize| &self.distances[first][input * count..][..count];
+            let mut pairs = PairColumn::new(sites, count);
+            let mut squared = vec![0.0; count];
+            for (input, scale) in joint.iter().enumerate().take(width) {
+                add_product(&mut squared, (distances(input), 0), &[*scale]);
+            }
+            pairs.set(sites, &squared);
+            let mut covariances = vec![0.0; sites * count];
+            for (site, covariance) in covariances.chunks_exact_mut(count).enumerate() {
+                covariance.fill(hyper.constant[site].powi(2));
+                add_product(covariance, (pairs.of(sites).0, 0), &[hyper.joint[site].powi(2)]);
+                if let Some(input) = self.inputs.sites[site].single {
+                    squared.fill(0.0);
+                    add_product(&mut squared, (distances(input), 0), &[single[site]]);
+                    pairs.set_single(site, &squared);
+                    add_product(covariance, (pairs.of(site).0, 0), &[hyper.single[site].powi(2)]);
                 }
-                position_covariances(
-                    &covariances,
-                    (self.rows, second),
-                    (self.rows, first),
-                    |a, b, value| {
-                        out[b * AXES * n + AXES * second + a] = value;
-                    },
-                );
+            }
+            let mut sums = vec![0.0; count];
+            for (axis, out) in out.chunks_exact_mut(AXES * n).enumerate() {
+                let of_first = self.rows.sites_of(AXES * first + axis);
+                for other in 0..AXES {
+                    sums.fill(0.0);
+                    for (site, covariance) in covariances.chunks_exact(count).enumerate() {
+                        let levers = self.levers.from(first, (other, site));
+                        add_products(&mut sums, levers, covariance, of_first[site]);
+                    }
+                    let entries = out[AXES * first + other..].iter_mut().step_by(AXES);
+                    entries.zip(&sums).for_each(|(entry, sum)| *entry = *sum);
+                }
             }
             pairs
         };
@@ -347,35 +359,37 @@ impl<'a> MarginalLikelihood<'a> {
         // each site (single, joint and constant functions, single lengths) and for each input
         // (joint lengths).
         let column = |first: usize| {
+            let count = n - first;
             let mut out = vec![0.0; 4 * sites + width];
-            let mut carried = vec![0.0; sites];
-            for (pair, second) in (first..n).enumerate() {
-                let factor = if first == second { 0.5 } else { 1.0 };
-                carried.fill(0.0);
-                for b in 0..AXES {
-                    for a in 0..AXES {
-                        let entry = factor * weight[(AXES * second + a, AXES * first + b)];
-                        let columns = self.rows.sites_of(AXES * second + a).iter();
-                        let columns = columns.zip(self.rows.sites_of(AXES * first + b));
-                        for (out, (left, right)) in carried.iter_mut().zip(columns) {
-                            *out += entry * left * right;
-                        }
+            let mut carried = vec![0.0; sites * count];
+            let mut entries = vec![0.0; count];
+            for axis in 0..AXES {
+                let column = AXES * first + axis;
+                let weights = &weight.as_slice()[weight.nrows() * column..][..weight.nrows()];
+                for other in 0..AXES {
+                    let behind = weights[AXES * first + other..].iter().step_by(AXES);
+                    entries.iter_mut().zip(behind).for_each(|(entry, weight)| *entry = *weight);
+                    entries[0] *= 0.5;
+                    for (site, carried) in carried.chunks_exact_mut(count).enumerate() {
+                        let levers = self.levers.from(first, (other, site));
+                        let factor = self.rows.sites_of(column)[site];
+                        add_products(carried, &entries, levers, factor);
                     }
                 }
-                let (correlation, slope) = pairs[first].joint[pair];
-                let mut whole = 0.0;
-                for site in 0..sites {
-                    let single = pairs[first].single[sites * pair + site];
-                    out[site] += carried[site] * single.0;
-                    out[sites + site] += carried[site] * correlation;
-                    out[2 * sites + site] += carried[site];
-                    out[3 * sites + site] += carried[site] * single.1;
-                    whole += hyper.joint[site].powi(2) * carried[site];
-                }
-                let squared = &self.distances[first][width * pair..width * (pair + 1)];
-                for (out, squared) in out[4 * sites..].iter_mut().zip(squared) {
-                    *out += whole * slope * squared;
-                }
+            }
+            let (correlations, slopes) = pairs[first].of(sites);
+            entries.fill(0.0);
+            for (site, carried) in carried.chunks_exact(count).enumerate() {
+                let single = pairs[first].of(site);
+                out[site] = sum_of_products(carried, single.0);
+                out[sites + site] = sum_of_products(carried, correlations);
+                out[2 * sites + site] = carried.iter().sum();
+                out[3 * sites + site] = sum_of_products(carried, single.1);
+                add_products(&mut entries, carried, slopes, hyper.joint[site].powi(2));
+            }
+            for (input, out) in out[4 * sites..].iter_mut().enumerate() {
+                let squared = &self.distances[first][input * count..][..count];
+                *out = sum_of_products(&entries, squared);
             }
             out
         };

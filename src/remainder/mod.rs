@@ -23,6 +23,7 @@ mod kernel;
 mod likelihood;
 mod linearise;
 mod noise_likelihood;
+mod pairs;
 mod placement_fit;
 mod posterior;
 mod prior;

@@ -7,14 +7,13 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::data::Data;
-use super::neighbourhood::{Derivatives, LinearNeighbourhood, Linearised, Unknowns};
+use super::neighbourhood::{Derivatives, HatBlocks, LinearNeighbourhood, Linearised, Unknowns};
 use crate::fit::{
     Identification, IdentifyError, Noise, Options, Placement, identify, selection_of_outliers,
 };
 use crate::least_squares::MANY_UNKNOWNS;
 use crate::model::parameter::{BeamField, ParameterSite, Regressor};
 use crate::model::{Model, Pose};
-use crate::numeric::{gram, inverse_factor, product_with_upper};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Factor on σ that gives an outlier practically no weight.
@@ -406,33 +405,30 @@ fn find_outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     // The concentration steps use the rows of the evidence, the final steps all rows.
     let (rows, subset) = (data.rows(), data.evidence_rows());
     let is_whole = rows.len() == subset.len();
-    let linearised = if is_whole {
+    let mut linearised = if is_whole {
         fitted.linearised(data, &[])
     } else {
         fitted.linearised_at(data, &subset, &[])
     };
-    let fit = fitted.neighbourhood(&linearised);
+    let mut of_all = HatBlocks::new(fitted.neighbourhood(&linearised));
     let mut aside = Vec::new();
     for _ in 0..MAX_CONCENTRATION_STEPS {
-        let squares = squared_distances(fitted, (&linearised, &fit), &aside);
+        let squares = squared_distances(fitted, (&linearised, &of_all), &aside);
         let next = worst(&squares, allowed(subset.len()));
         if next == aside {
             break;
         }
         aside = next;
     }
-    let (linearised, fit) = if is_whole {
-        (linearised, fit)
-    } else {
-        let linearised = fitted.linearised(data, &[]);
-        let fit = fitted.neighbourhood(&linearised);
-        (linearised, fit)
-    };
+    if !is_whole {
+        linearised = fitted.linearised(data, &[]);
+        of_all = HatBlocks::new(fitted.neighbourhood(&linearised));
+    }
     let kept: BTreeSet<usize> =
         (0..subset.len()).filter(|k| !aside.contains(k)).map(|k| subset[k]).collect();
     let mut aside: Vec<usize> = (0..rows.len()).filter(|&k| !kept.contains(&rows[k])).collect();
     for _ in 0..MAX_CONCENTRATION_STEPS {
-        let squares = squared_distances(fitted, (&linearised, &fit), &aside);
+        let squares = squared_distances(fitted, (&linearised, &of_all), &aside);
         let outlier_count =
             squares.iter().filter(|square| **square > OUTLIER_SQUARED_DISTANCE).count();
         if outlier_count > allowed(rows.len()) {
@@ -448,38 +444,21 @@ fn find_outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
 }
 
 /// Returns the squared distance of each pose from the fit without the poses `aside`, in units of
-/// the variance of one coordinate. `fit` is the linear neighbourhood with all poses.
+/// the variance of one coordinate, given the fit to all poses.
 ///
 /// The squared distance is rᵀ C⁻¹ r divided by the scatter: the median over all poses relative to
 /// that of normal residuals, at least 1 if σ is declared. C = 1 − H for a pose in the fit, C = 1 +
 /// H for one that was left out.
-///
-/// With Q the orthonormal basis of all poses, Q_S its rows of the poses `aside`, and weights 1 − w
-/// of these: G = 1 − w Q_SᵀQ_S, H = Q G⁻¹ Qᵀ, and r changes by w Q G⁻¹ Q_Sᵀr_S.
 fn squared_distances(
     fitted: &Fitted,
-    (linearised, fit): (&Linearised, &LinearNeighbourhood),
+    (linearised, of_all): (&Linearised, &HatBlocks),
     aside: &[usize],
 ) -> Vec<f64> {
-    let (basis, residual) = (fit.fitted(), fit.residual().rows(0, fit.rows()));
-    let mut is_aside = vec![false; residual.len() / 3];
-    for &pose in aside {
-        is_aside[pose] = true;
-    }
-    let rows_aside: Vec<usize> = aside.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
-    let (removed, weight) =
-        (basis.select_rows(&rows_aside), 1.0 - SIGMA_FACTOR_OF_OUTLIERS.powi(-2));
-    let n = basis.ncols();
-    let within = inverse_factor(&(DMatrix::identity(n, n) - gram(&removed) * weight))
-        .unwrap_or_else(|| DMatrix::identity(n, n));
-    let along = product_with_upper(&basis.into_owned(), &within.transpose());
-    let step = &within * removed.tr_mul(&residual.select_rows(&rows_aside)) * weight;
-    let left = residual + &along * step;
+    let (hats, left) = of_all.without(aside, 1.0 - SIGMA_FACTOR_OF_OUTLIERS.powi(-2));
     let square = |pose: usize| {
-        let (rows_of_pose, r) =
-            (along.rows(3 * pose, 3), left.fixed_rows::<3>(3 * pose).into_owned());
-        let hat = Matrix3::from_fn(|i, j| rows_of_pose.row(i).dot(&rows_of_pose.row(j)));
-        let covariance = if is_aside[pose] {
+        let r = left.fixed_rows::<3>(3 * pose).into_owned();
+        let hat = hats[pose];
+        let covariance = if aside.binary_search(&pose).is_ok() {
             Matrix3::identity() + hat
         } else {
             Matrix3::identity() * (1.0 + MIN_VARIANCE_OF_POSE) - hat

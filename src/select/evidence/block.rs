@@ -3,7 +3,6 @@
 
 use crate::select::settings::{DISPLACEMENTS, MAX_WIDE_COLUMNS};
 use std::borrow::Cow;
-use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -158,8 +157,9 @@ pub(super) struct Block {
 
 #[derive(Debug, Clone)]
 enum Columns {
-    /// Columns with the fitted parameters projected out.
-    Dense(Arc<DMatrix<f64>>),
+    /// Columns as [`LinearNeighbourhood::with_components`] returns them: the fitted parameters are
+    /// projected out of some only.
+    Dense(DMatrix<f64>),
     /// Grouped columns before the projection.
     Grouped { levers: DMatrix<f64>, groups: Vec<Option<usize>> },
 }
@@ -177,8 +177,8 @@ impl Block {
     }
 
     /// Creates a block from each design of root mean square 1, the logarithm of its prior
-    /// probability, and the prior on its coefficients. All columns are projected in one product,
-    /// which is faster.
+    /// probability, and the prior on its coefficients. The components of all columns along the
+    /// fitted parameters are computed in one product, which is faster.
     pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
         let dense = designs.iter().filter_map(|(design, ..)| {
             if let Design::Dense(columns) = design { Some(columns) } else { None }
@@ -190,18 +190,20 @@ impl Block {
             .column_iter_mut()
             .zip(columns)
             .for_each(|(mut target, column)| target.copy_from(&column));
-        let all_projected = fit.projected_out(&dense_columns);
+        let (all_columns, all_along) = fit.with_components(&dense_columns);
         let mut first = 0;
         let of = |(design, ln_prior, coefficients): (Design, f64, Coefficients)| {
             let (columns, normal) = match design {
                 Design::Dense(columns) => {
-                    let projected = all_projected.columns(first, columns.ncols()).into_owned();
+                    let columns = all_columns.columns(first, columns.ncols()).clone_owned();
+                    let along = all_along.columns(first, columns.ncols());
                     first += columns.ncols();
-                    let mut gram = DMatrix::zeros(projected.ncols(), projected.ncols());
+                    let mut gram = DMatrix::zeros(columns.ncols(), columns.ncols());
                     // Transposing the narrow matrix gives the fastest product.
-                    gram.gemm(1.0, &projected.transpose(), &projected, 0.0);
-                    let product = projected.tr_mul(fit.residual());
-                    (Columns::Dense(Arc::new(projected)), Normal::Dense { product, gram })
+                    gram.gemm(1.0, &columns.transpose(), &columns, 0.0);
+                    gram.gemm(-1.0, &along.transpose(), &along, 1.0);
+                    let product = columns.tr_mul(fit.residual());
+                    (Columns::Dense(columns), Normal::Dense { product, gram })
                 }
                 Design::Grouped { levers, groups } => {
                     let normal = grouped_products(&levers, &groups, fit);
@@ -243,12 +245,18 @@ impl Block {
     }
 
     /// Returns the columns A of the hypothesis, with the fitted parameters projected out.
-    pub fn columns(&self, fit: &LinearNeighbourhood) -> Arc<DMatrix<f64>> {
+    pub fn columns(&self, fit: &LinearNeighbourhood) -> DMatrix<f64> {
+        fit.projected_out(&self.unprojected())
+    }
+
+    /// Returns columns that are A once the fitted parameters are projected out: as they are stored,
+    /// or grouped columns written out.
+    pub fn unprojected(&self) -> Cow<'_, DMatrix<f64>> {
         match &self.columns {
-            Columns::Dense(columns) => Arc::clone(columns),
+            Columns::Dense(columns) => Cow::Borrowed(columns),
             Columns::Grouped { levers, groups } => {
                 let design = Design::Grouped { levers: levers.clone(), groups: groups.clone() };
-                Arc::new(fit.projected_out(&design.columns()))
+                Cow::Owned(design.columns().into_owned())
             }
         }
     }
@@ -258,8 +266,8 @@ impl Block {
         self.normal.product()
     }
 
-    /// Returns the projected columns if they are stored as a full matrix; `None` if they are stored
-    /// as groups.
+    /// Returns [`Self::unprojected`] columns if they are stored as a full matrix; `None` if they are
+    /// stored as groups.
     pub fn dense(&self) -> Option<&DMatrix<f64>> {
         if let Columns::Dense(columns) = &self.columns { Some(columns) } else { None }
     }
@@ -276,12 +284,12 @@ impl Block {
 
     /// Returns ln p(r | set and block) − ln p(r | set), and the most probable size of the block.
     ///
-    /// `set` holds Z A and Z r: the set reduces AᵀA by (Z A)ᵀZ A and Aᵀr by (Z A)ᵀZ r; it is `None`
-    /// for the empty set. `squares_and_freedom` are the sum of squares that the set leaves, and its
-    /// degrees of freedom. `without` is ln p(r | set).
+    /// `set` holds Z A (column by column) and Z r: the set reduces AᵀA by (Z A)ᵀZ A and Aᵀr by (Z
+    /// A)ᵀZ r; it is `None` for the empty set. `squares_and_freedom` are the sum of squares that the
+    /// set leaves, and its degrees of freedom. `without` is ln p(r | set).
     pub fn gain(
         &self,
-        set: Option<(&DMatrix<f64>, &DVector<f64>)>,
+        set: Option<(&[f64], &DVector<f64>)>,
         (squares_and_freedom, without): ((f64, f64), f64),
         grid: &NoiseGrid,
     ) -> (f64, f64) {
@@ -355,14 +363,14 @@ mod tests {
                         Some(columns) => &within * columns,
                         None => block.times_grouped(&within),
                     };
-                    let set = is_beside.then_some((&along, &residual_along));
+                    let set = is_beside.then_some((along.as_slice(), &residual_along));
                     (block.gain(set, ((100.0, 30.0), 0.0), &grid), block.columns(&fit))
                 });
                 assert!(
                     (one.0.0 - other.0.0).abs() < 1e-9 && (one.0.1 - other.0.1).abs() < 1e-12,
                     "{one:?} {other:?}"
                 );
-                assert!((&*one.1 - &*other.1).amax() < 1e-12);
+                assert!((one.1 - other.1).amax() < 1e-12);
             }
         }
     }

@@ -3,7 +3,7 @@
 //! The products of many pairs are one matrix product, since each pair alone would read its columns
 //! from memory again. An entry does not depend on the pairs that are formed with it.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -26,7 +26,7 @@ pub(super) struct ColumnProducts(Vec<OnceLock<Member>>);
 pub(super) struct Member {
     /// Whitened columns A of the hypothesis with the fitted parameters projected out, shape = (3 N,
     /// k).
-    pub columns: Arc<DMatrix<f64>>,
+    pub columns: DMatrix<f64>,
     /// Transpose of `columns`, shape = (k, 3 N).
     pub transposed: DMatrix<f64>,
     /// Products AᵀC of `columns` with the columns C of every hypothesis, each computed on first
@@ -61,7 +61,8 @@ impl Member {
     /// Returns the product AᵀC with the columns C of another hypothesis.
     pub fn product_with(&self, other: usize, blocks: &[Block]) -> &DMatrix<f64> {
         self.products[other].get_or_init(|| match blocks[other].dense() {
-            Some(columns) => products_together(&[self], &[columns]),
+            Some(columns) => products_of_stacked(&stacked(&[self]), &[columns])
+                .resize_vertically(self.transposed.nrows(), 0.0),
             None => blocks[other].times_grouped(&self.transposed),
         })
     }
@@ -73,6 +74,7 @@ impl Member {
 
 /// Forms the products of some members with the hypotheses `others`, as far as they are missing.
 pub(super) fn form_products(members: &[&Member], others: &[usize], blocks: &[Block]) {
+    let of_all = OnceLock::new();
     let form_block = |others: &[usize]| {
         let is_missing = |other: usize| members.iter().any(|member| member.lacks(other));
         let missing: Vec<(usize, &DMatrix<f64>)> = others
@@ -89,7 +91,11 @@ pub(super) fn form_products(members: &[&Member], others: &[usize], blocks: &[Blo
             return;
         }
         let columns: Vec<&DMatrix<f64>> = missing.iter().map(|(_, columns)| *columns).collect();
-        let product_of_lacking = products_together(&lacking, &columns);
+        let product_of_lacking = if lacking.len() == members.len() {
+            products_of_stacked(of_all.get_or_init(|| stacked(members)), &columns)
+        } else {
+            products_of_stacked(&stacked(&lacking), &columns)
+        };
         let mut row = 0;
         for member in lacking {
             let (count, mut column) = (member.columns.ncols(), 0);
@@ -108,26 +114,34 @@ pub(super) fn form_products(members: &[&Member], others: &[usize], blocks: &[Blo
     others.par_chunks(HYPOTHESES_PER_PRODUCT).for_each(form_block);
 }
 
-/// Returns the products AᵀC of the members' columns, one below the other, with `columns` side by
-/// side. Rows and columns of zeros are added up to [`MIN_SIDE`] for several pairs only.
-fn products_together(members: &[&Member], columns: &[&DMatrix<f64>]) -> DMatrix<f64> {
-    let height: usize = members.iter().map(|member| member.columns.ncols()).sum();
-    let width: usize = columns.iter().map(|columns| columns.ncols()).sum();
-    let rows = columns.first().map_or(0, |columns| columns.nrows());
+/// Returns the transposed columns of some members, one below the other. Rows of zeros are added up
+/// to [`MIN_SIDE`].
+fn stacked(members: &[&Member]) -> DMatrix<f64> {
+    let height: usize = members.iter().map(|member| member.transposed.nrows()).sum();
+    let rows = members.first().map_or(0, |member| member.transposed.ncols());
     let mut stacked = DMatrix::zeros(height.max(MIN_SIDE), rows);
     let mut first = 0;
     for Member { transposed, .. } in members {
         stacked.rows_mut(first, transposed.nrows()).copy_from(transposed);
         first += transposed.nrows();
     }
-    let mut right = DMatrix::zeros(rows, width.max(MIN_SIDE));
-    let mut first = 0;
+    stacked
+}
+
+/// Returns the products AᵀC of `stacked` members with `columns` side by side. Columns of zeros are
+/// added up to [`MIN_SIDE`] for several pairs only.
+pub(super) fn products_of_stacked(
+    stacked: &DMatrix<f64>,
+    columns: &[&DMatrix<f64>],
+) -> DMatrix<f64> {
+    let width: usize = columns.iter().map(|columns| columns.ncols()).sum();
+    let mut right = Vec::with_capacity(stacked.ncols() * width.max(MIN_SIDE));
     for columns in columns {
-        right.columns_mut(first, columns.ncols()).copy_from(columns);
-        first += columns.ncols();
+        right.extend_from_slice(columns.as_slice());
     }
-    let product = stacked * right;
-    product.view((0, 0), (height, width)).into_owned()
+    right.resize(stacked.ncols() * width.max(MIN_SIDE), 0.0);
+    let product = stacked * DMatrix::from_vec(stacked.ncols(), width.max(MIN_SIDE), right);
+    product.resize_horizontally(width, 0.0)
 }
 
 #[cfg(test)]
@@ -164,7 +178,7 @@ mod tests {
             for &other in &all {
                 let single = alone.member(k, &blocks, &fit).product_with(other, &blocks);
                 assert_eq!(member.product_with(other, &blocks), single, "{k} {other}");
-                let exact = member.columns.tr_mul(&*blocks[other].columns(&fit));
+                let exact = member.columns.tr_mul(&blocks[other].columns(&fit));
                 assert!((single - exact).amax() < 1e-9);
             }
         }

@@ -12,10 +12,11 @@
 //! to a hundred σ. ln f has a Cauchy prior about 0: a declared σ is mostly right to a tenth, but
 //! may also be very wrong.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
+use super::few_columns::{MAX_FEW, shrinkage_of_few};
 use super::likelihood_table::{Jet, LikelihoodTable};
-use crate::numeric::kernel::few_transposed_times;
+use crate::numeric::kernel::subtract_few_products;
 use crate::numeric::lower_factor;
 
 /// Largest |ln f| of the grid over the noise factor f, a factor of 33 in either direction. The step
@@ -35,8 +36,6 @@ const NEGLIGIBLE_LN_ODDS: f64 = 40.0;
 /// Ratio of rows to columns of L above which G = D − LᵀL is factored as a full matrix. Two factors
 /// of G then take less work than two of 1 − L E⁻¹ Lᵀ.
 const MIN_DENSE_RATIO: f64 = 0.8;
-/// Largest number of columns whose Gram matrix is formed by dot products.
-const MAX_NARROW_GRAM: usize = 6;
 /// Number of rows of a symmetric product that are formed together.
 const GRAM_ROWS: usize = 48;
 
@@ -158,25 +157,27 @@ impl Normal {
     }
 
     /// Returns the products after a set is projected out of columns and residual, given Z A =
-    /// `along` and Z r = `residual_along`.
-    pub fn reduced_by(&self, along: &DMatrix<f64>, residual_along: &DVector<f64>) -> Self {
+    /// `along` (column by column) and Z r = `residual_along`.
+    pub fn reduced_by(&self, along: &[f64], residual_along: &DVector<f64>) -> Self {
+        let columns = self.product().len();
+        let matrix = DMatrixView::from_slice(along, residual_along.len(), columns);
         match self {
             Self::Dense { gram, product } => {
                 let (mut gram, mut product) = (gram.clone(), product.clone());
-                if gram.ncols() <= MAX_NARROW_GRAM {
-                    gram -= few_transposed_times(along, along);
+                if columns <= MAX_FEW {
+                    subtract_few_products(gram.as_mut_slice(), along, columns);
                 } else {
-                    gram.gemm(-1.0, &along.transpose(), along, 1.0);
+                    gram.gemm(-1.0, &matrix.transpose(), &matrix, 1.0);
                 }
-                product.gemv_tr(-1.0, along, residual_along, 1.0);
+                product.gemv_tr(-1.0, &matrix, residual_along, 1.0);
                 Self::Dense { gram, product }
             }
             Self::LowRankCorrection { diagonal, less, product } => {
                 let mut product = product.clone();
-                product.gemv_tr(-1.0, along, residual_along, 1.0);
-                let (few, more) = (less.nrows(), along.nrows());
+                product.gemv_tr(-1.0, &matrix, residual_along, 1.0);
+                let (few, more) = (less.nrows(), matrix.nrows());
                 let mut less = less.clone().resize_vertically(few + more, 0.0);
-                less.rows_mut(few, more).copy_from(along);
+                less.rows_mut(few, more).copy_from(&matrix);
                 Self::LowRankCorrection { diagonal: diagonal.clone(), less, product }
                     .dense_if_cheaper()
             }
@@ -203,14 +204,12 @@ impl Normal {
     fn shrinkage_terms(&self, size: f64) -> Option<(f64, f64)> {
         let precision = (size * size).recip();
         match self {
-            // A single column is solved without allocating memory.
-            Self::Dense { gram, product } if product.len() == 1 => {
-                let lower = (gram[0] + precision).sqrt();
-                (lower > 0.0).then(|| ((lower * size).ln(), (product[0] / lower).powi(2)))
+            // With 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², and the squares decrease by |L⁻¹
+            // b|². Few columns are solved without allocating memory.
+            Self::Dense { gram, product } if product.len() <= MAX_FEW => {
+                shrinkage_of_few(gram, product, size)
             }
             Self::Dense { gram, product } => {
-                // With 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², and the squares decrease by
-                // |L⁻¹ b|².
                 let lower = lower_factor(with_prior(gram, precision))?;
                 let mut whitened = product.clone();
                 if !lower.solve_lower_triangular_mut(&mut whitened) {

@@ -19,6 +19,7 @@ mod column_products;
 mod columns;
 mod elsewhere;
 mod families;
+mod few_columns;
 mod finer;
 mod functions;
 mod hypotheses;

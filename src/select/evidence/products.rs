@@ -2,13 +2,15 @@
 //! the evidence of a set depends. Each product is computed on first use and cached.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Block;
 use super::cache::Cache;
-use super::column_products::{ColumnProducts, MIN_SIDE, Member, form_products};
+use super::column_products::{
+    ColumnProducts, MIN_SIDE, Member, form_products, products_of_stacked,
+};
 use super::marginal::{Noise, NoiseGrid, Normal};
 use crate::fit::Stop;
 use crate::numeric::parallel;
@@ -290,7 +292,7 @@ impl ReducedProblem<'_, '_> {
         let mut first = 0;
         for &member in &self.members {
             let columns = &self.products.member(member).columns;
-            residual.gemv(-1.0, columns.as_ref(), &along.rows(first, columns.ncols()), 1.0);
+            residual.gemv(-1.0, columns, &along.rows(first, columns.ncols()), 1.0);
             first += columns.ncols();
         }
         residual
@@ -339,17 +341,15 @@ impl ReducedProblem<'_, '_> {
         // A gain does not depend on the hypotheses that are tried with it.
         let width = counts().sum::<usize>().max(MIN_SIDE);
         let mut stacked = DMatrix::zeros(self.residual_along.len(), width);
-        let mut first = 0;
-        for &member in &self.members {
+        for (&member, &first) in self.members.iter().zip(&self.begins) {
             let count = self.products.member(member).columns.ncols();
-            let mut target = stacked.rows_mut(first, count);
-            let mut column = 0;
+            let mut targets = stacked.as_mut_slice().chunks_exact_mut(self.within.nrows().max(1));
             for &block in tried {
-                let with = self.products.product(member, block);
-                target.columns_mut(column, with.ncols()).copy_from(with);
-                column += with.ncols();
+                let with = self.products.product(member, block).as_slice();
+                for (column, target) in with.chunks_exact(count.max(1)).zip(&mut targets) {
+                    target[first..first + count].copy_from_slice(column);
+                }
             }
-            first += count;
         }
         self.gains_along(
             tried.iter().map(|&block| &blocks[block]),
@@ -360,13 +360,12 @@ impl ReducedProblem<'_, '_> {
     /// Returns ln of the odds of the set with each of `blocks` over the set alone, priors included.
     /// These blocks need not be in the list of blocks of the products.
     pub fn ln_odds_of(&self, blocks: &[Block]) -> Vec<f64> {
-        let columns: Vec<Arc<DMatrix<f64>>> =
-            blocks.iter().map(|block| block.columns(&self.products.residual_model.fit)).collect();
-        let new_columns: Vec<_> = columns.iter().flat_map(|matrix| matrix.column_iter()).collect();
-        if new_columns.is_empty() {
-            return Vec::new();
-        }
-        let along = self.reach() * DMatrix::from_columns(&new_columns);
+        let padded = |block: &Block| {
+            let rows = self.products.residual_model.fit.residual().len();
+            block.unprojected().into_owned().resize_vertically(rows, 0.0)
+        };
+        let columns: Vec<DMatrix<f64>> = blocks.iter().map(padded).collect();
+        let along = products_of_stacked(self.reach(), &columns.iter().collect::<Vec<_>>());
         let gains = self.gains_along(blocks.iter(), &along);
         gains
             .into_iter()
@@ -384,12 +383,12 @@ impl ReducedProblem<'_, '_> {
     ) -> Vec<(f64, f64)> {
         let Products { residual_model, grid, .. } = self.products;
         let squares_and_freedom = ((self.squares, residual_model.noise.freedom), self.without);
-        let mut first = 0;
+        let mut rest = along.as_slice();
         let gain = |block: &Block| {
-            let along_block = along.columns(first, block.product().len()).into_owned();
-            first += along_block.ncols();
+            let (along_block, others) = rest.split_at(along.nrows() * block.product().len());
+            rest = others;
             block.gain(
-                (!self.members.is_empty()).then_some((&along_block, &self.residual_along)),
+                (!self.members.is_empty()).then_some((along_block, &self.residual_along)),
                 squares_and_freedom,
                 grid,
             )
@@ -436,7 +435,7 @@ mod tests {
         let mut covariance = DMatrix::identity(r.len(), r.len());
         for (&member, size) in members.iter().zip(sizes) {
             let columns = blocks[member].columns(&residual_model.fit);
-            covariance += &*columns * columns.transpose() * (size * size);
+            covariance += &columns * columns.transpose() * (size * size);
         }
         let factor = covariance.cholesky().unwrap();
         let solved = factor.solve(r);

@@ -21,9 +21,11 @@ const MAX_PAIRED_MEMBERS: usize = 6;
 /// Maximum number of passes that replace members of the most probable sets found so far.
 const MAX_EXCHANGES: usize = 4;
 
+/// Smallest probability of a set that a search returns. All other sets together have none.
+const MIN_LISTED_PROBABILITY: f64 = 1e-20;
+
 /// Largest difference of ln posteriors that rounding alone causes between sets of the same members
-/// in another order. The order found first is kept, so that effects are listed alike on every
-/// machine.
+/// in another order. The order found first is kept, so that effects are listed alike everywhere.
 const MAX_ROUNDING_OF_LN_POSTERIOR: f64 = 1e-6;
 
 /// Set of hypotheses with its probability among all sets evaluated.
@@ -106,8 +108,8 @@ impl Set {
     }
 }
 
-/// Returns all sets that were evaluated, the most probable first. The empty set stands for noise
-/// alone.
+/// Returns the sets that were evaluated, the most probable first, without impossible ones. The
+/// empty set stands for noise alone.
 ///
 /// The search starts from the empty set, from the set `present`, and from `present` without each of
 /// its members. If a stop is requested, only some sets are evaluated.
@@ -153,9 +155,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         let is_limit = |set: &&Set| !set.has_wide(blocks) || products.has_gear(&set.members);
         let can_grow = evaluated.values().filter(is_limit);
         let best_known = can_grow.map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
-        let mut sets: Vec<Set> = next.values().cloned().collect();
-        evaluated.extend(next);
-        sets.sort_by(best_first);
+        let mut sets: Vec<&Set> = next.values().collect();
+        sets.sort_by(|a, b| best_first(a, b));
         promising.get_or_insert_with(|| {
             let mut promising: Vec<usize> = Vec::new();
             for last in sets.iter().filter_map(|set| set.members.last()) {
@@ -167,7 +168,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         });
         sets.retain(|set| !set.has_wide(blocks));
         sets.truncate(BEAM_WIDTH);
-        front = sets.into_par_iter().map(|set| set.settled(products)).collect();
+        front = sets.into_par_iter().map(|set| set.clone().settled(products)).collect();
+        evaluated.extend(next);
         front.sort_by(best_first);
         evaluated.extend(front.iter().map(|set| (set.key(), set.clone())));
         if front.first().is_none_or(|best| best.ln_posterior < best_known - LOG_ODDS_CUTOFF) {
@@ -187,8 +189,11 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         let probability = (ln_posterior - most).exp() / total;
         EvaluatedSet { members, sizes, probability }
     };
-    let mut evaluated_sets: Vec<EvaluatedSet> =
-        evaluated.into_values().map(with_probability).collect();
+    let mut evaluated_sets: Vec<EvaluatedSet> = evaluated
+        .into_values()
+        .map(with_probability)
+        .filter(|set| set.probability > MIN_LISTED_PROBABILITY)
+        .collect();
     evaluated_sets.sort_by(|a, b| {
         b.probability.total_cmp(&a.probability).then_with(|| a.members.cmp(&b.members))
     });
@@ -255,9 +260,9 @@ fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Produc
     for _ in 0..MAX_EXCHANGES {
         let mut likely: Vec<&Set> =
             evaluated.values().filter(|set| !set.has_wide(blocks)).collect();
-        likely.sort_by(|a, b| best_first(a, b));
-        let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
+        let Some(best) = likely.iter().map(|set| set.ln_posterior).reduce(f64::max) else { return };
         likely.retain(|set| set.ln_posterior > best - LOG_ODDS_CUTOFF);
+        likely.sort_by(|a, b| best_first(a, b));
         let is_surface = |member: &usize| blocks[*member].is_surface;
         let surfaces = likely
             .iter()
@@ -311,12 +316,13 @@ fn replaced(
     let remaining =
         if products.residual_model.stop.is_requested() { None } else { assembled(rest, products) };
     let Some(remaining) = remaining else { return Vec::new() };
-    let mut with_first = extended(&remaining, first, products);
-    with_first.sort_by(best_first);
+    let with_first = extended(&remaining, first, products);
+    let mut new: Vec<&Set> = with_first.iter().collect();
+    new.sort_by(|a, b| best_first(a, b));
     let second: BTreeSet<usize> =
         second.iter().copied().filter(|other| !removed.contains(other)).collect();
     let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
-    let near: Vec<&Set> = with_first.iter().filter(is_near).take(MAX_EXTENDING).collect();
+    let near: Vec<&Set> = new.iter().copied().filter(is_near).take(MAX_EXTENDING).collect();
     let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
     let second: Vec<usize> = second.into_iter().collect();
     let narrow: Vec<&Set> =
@@ -326,13 +332,13 @@ fn replaced(
         extended(set, if place == 0 { &second } else { &promising }, products)
     };
     let two: Vec<Set> = narrow.iter().enumerate().flat_map(longer).collect();
-    let mut new: Vec<Set> = with_first.into_iter().chain(two).collect();
-    new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    new.extend(&two);
+    new.sort_by(|a, b| best_first(a, b));
     // With converged sizes, a set may be far more probable than with sizes found one after the
     // other.
-    let rest_of_new = new.split_off(new.len().min(BEAM_WIDTH));
-    let settled: Vec<Set> = new.into_par_iter().map(|set| set.settled(products)).collect();
-    let probable = rest_of_new.into_iter().filter(|set| set.ln_posterior > least);
+    let (best, others) = new.split_at(new.len().min(BEAM_WIDTH));
+    let settled: Vec<Set> = best.par_iter().map(|&set| set.clone().settled(products)).collect();
+    let probable = others.iter().copied().filter(|set| set.ln_posterior > least).cloned();
     std::iter::once(remaining).chain(settled).chain(probable).collect()
 }
 

@@ -80,8 +80,8 @@ impl Noise {
 pub struct WhitenedSite {
     /// Vector d: squared length of the lever in each pose, shape = (poses).
     pub diagonal: DVector<f64>,
-    /// Upper triangular factor R, shape = (poses, poses), of the part RᵀR that the fitted
-    /// parameters explain: W = diag(d) − RᵀR.
+    /// Matrix R of the part RᵀR that the fitted parameters explain: W = diag(d) − RᵀR. It is B, or
+    /// the upper triangular factor of B, shape = (poses, poses), if that takes less work.
     less: DMatrix<f64>,
     /// Vector p: product of each pose's column with the residual, shape = (poses).
     pub product: DVector<f64>,
@@ -112,13 +112,19 @@ impl WhitenedSite {
     /// Creates the site from the vector d, the matrix B with one column for each pose, and the
     /// vector p.
     pub fn new(diagonal: DVector<f64>, b: &DMatrix<f64>, product: DVector<f64>) -> Self {
-        Self { diagonal, less: Triangle::factor(b), product }
+        let is_short = 2 * b.nrows() < b.ncols();
+        let less = if is_short { b.clone() } else { Triangle::factor(b) };
+        Self { diagonal, less, product }
     }
 
     /// Returns R times functions of the pose, one in each column of `functions`.
     pub fn within(&self, functions: &DMatrix<f64>) -> DMatrix<f64> {
-        let poses = self.less.nrows();
-        let mut out = DMatrix::zeros(poses, functions.ncols());
+        let (rows, poses) = self.less.shape();
+        let mut out = DMatrix::zeros(rows, functions.ncols());
+        if rows < poses {
+            out.gemm(1.0, &self.less, functions, 0.0);
+            return out;
+        }
         for first in (0..poses).step_by(ROWS_PER_PRODUCT) {
             let (count, filled) = (ROWS_PER_PRODUCT.min(poses - first), poses - first);
             let rows = self.less.view((first, first), (count, filled));

@@ -1,8 +1,9 @@
 //! Prediction of parts of the data from the other parts, for many trial priors, by normal equations
 //! of each part.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3};
 
+use super::linear::LinearNeighbourhood;
 use super::orthonormal::MIN_INDEPENDENT_LENGTH;
 use crate::numeric::parallel;
 use crate::numeric::{gram, inverse_factor, lower_factor, solve_positive};
@@ -116,9 +117,96 @@ impl PartSquares {
     }
 }
 
+/// Fit to all poses, with the diagonal blocks of its hat matrix H = Q Qᵀ, shape = (3, 3), one for
+/// each pose. Some of the poses are then taken out of it.
+pub(in crate::select) struct HatBlocks {
+    fit: LinearNeighbourhood,
+    blocks: Vec<Matrix3<f64>>,
+}
+
+impl HatBlocks {
+    /// Creates the blocks of a fit with the orthonormal basis Q.
+    pub fn new(fit: LinearNeighbourhood) -> Self {
+        Self { blocks: blocks_of_squares(fit.fitted()), fit }
+    }
+
+    /// Returns the blocks of H and the residual of the fit in which the poses `aside` have 1 − w
+    /// times their weight. If that fit does not exist because of rounding, they stay in it.
+    ///
+    /// With the rows Q_S of these poses, H = Q G⁻¹ Qᵀ with G = 1 − w Q_SᵀQ_S, and r changes by
+    /// w Q G⁻¹ Q_Sᵀr_S. For few poses, with 1/w − Q_S Q_Sᵀ = L Lᵀ and T = Q (L⁻¹Q_S)ᵀ, H = Q Qᵀ + T
+    /// Tᵀ, and r changes by T L⁻¹ r_S.
+    pub fn without(&self, aside: &[usize], w: f64) -> (Vec<Matrix3<f64>>, DVector<f64>) {
+        let rows: Vec<usize> = aside.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
+        let residual = self.fit.residual().rows(0, self.fit.rows());
+        let (removed, r) = (self.fit.fitted().select_rows(&rows), residual.select_rows(&rows));
+        let (n, few) = (removed.ncols(), rows.len() < removed.ncols());
+        let inner = if few {
+            DMatrix::identity(rows.len(), rows.len()) / w - &removed * removed.transpose()
+        } else {
+            DMatrix::identity(n, n) - gram(&removed) * w
+        };
+        let Some(inverse) = inverse_factor(&inner) else {
+            return (self.blocks.clone(), residual.into_owned());
+        };
+        let (within, step) = if few {
+            (&inverse * &removed, &inverse * r)
+        } else {
+            (inverse.clone(), inverse * removed.tr_mul(&r) * w)
+        };
+        let along = self.fit.fitted() * within.transpose();
+        let mut blocks = blocks_of_squares(along.as_view());
+        if few {
+            blocks.iter_mut().zip(&self.blocks).for_each(|(block, all)| *block += all);
+        }
+        (blocks, residual + along * step)
+    }
+}
+
+/// Returns the diagonal blocks of A Aᵀ, shape = (3, 3), one for each pose.
+fn blocks_of_squares(a: DMatrixView<f64>) -> Vec<Matrix3<f64>> {
+    let mut blocks = vec![Matrix3::zeros(); a.nrows() / 3];
+    for column in a.column_iter() {
+        for (pose, block) in blocks.iter_mut().enumerate() {
+            let entries = column.fixed_rows::<3>(3 * pose);
+            *block += entries * entries.transpose();
+        }
+    }
+    blocks
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::Unknowns;
     use super::*;
+
+    #[test]
+    fn poses_are_taken_out_of_a_fit_as_if_they_had_no_weight() {
+        let columns = DMatrix::from_fn(60, 4, |i, j| (1.7 * i as f64 + 2.3 * j as f64).sin());
+        let residual = DVector::from_fn(60, |i, _| (0.9 * i as f64).cos());
+        let unknowns = Unknowns {
+            x: vec![0.0; 4],
+            priors: vec![None, Some(0.5), None, None],
+            active: DMatrix::zeros(0, 4),
+        };
+        let fit = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
+        let all = HatBlocks::new(fit);
+        for aside in [vec![], vec![7], vec![2, 3, 11, 19]] {
+            let (mut left, mut r) = (columns.clone(), residual.clone());
+            for &pose in &aside {
+                left.rows_mut(3 * pose, 3).scale_mut(1e-4);
+                r.rows_mut(3 * pose, 3).scale_mut(1e-4);
+            }
+            let without = LinearNeighbourhood::new(&left, &r, &unknowns, 0);
+            let (blocks, residuals) = all.without(&aside, 1.0 - 1e-8);
+            for (pose, block) in blocks_of_squares(without.fitted()).iter().enumerate() {
+                let scale = if aside.contains(&pose) { 1e4 } else { 1.0 };
+                assert!((block * scale * scale - blocks[pose]).amax() < 1e-6);
+                let expected = without.residual().rows(3 * pose, 3) * scale;
+                assert!((expected - residuals.rows(3 * pose, 3)).amax() < 1e-9, "{pose}");
+            }
+        }
+    }
 
     #[test]
     fn evidence_is_the_density_of_the_residual() {

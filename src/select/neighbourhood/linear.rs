@@ -258,12 +258,39 @@ impl LinearNeighbourhood {
         self.components_by(unknowns).map(|(_, part)| part.norm_squared())
     }
 
-    /// Returns columns of the data, shape = (3 N, k), after the fitted parameters are projected
-    /// out, shape = (3 N + priors, k).
+    /// Returns columns C of the data, shape = (3 N, k), with rows of zeros for the priors, and their
+    /// components QᵀC along the basis.
+    ///
+    /// From columns of which the projection leaves little, the fitted parameters are projected out,
+    /// and their components are set to 0. The projected columns have the Gram matrix CᵀC −
+    /// (QᵀC)ᵀQᵀC without loss of digits. Products with other projected columns are those with C.
+    pub fn with_components(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        // Transposing the narrow matrix gives the fastest product.
+        let mut along = (columns.transpose() * self.fitted()).transpose();
+        let mut out = columns.clone().resize_vertically(self.residual.len(), 0.0);
+        let is_short = |k: &usize| {
+            let square = out.column(*k).norm_squared();
+            let left = square - along.column(*k).norm_squared();
+            left < MIN_PART_OF_ONE_PROJECTION.powi(2) * square
+        };
+        let short: Vec<usize> = (0..columns.ncols()).filter(is_short).collect();
+        if !short.is_empty() {
+            let mut remaining = out.select_columns(&short);
+            remaining.gemm(-1.0, &self.basis, &along.select_columns(&short), 1.0);
+            self.subtract_components(&mut remaining, self.residual.len());
+            for (&k, column) in short.iter().zip(remaining.column_iter()) {
+                out.set_column(k, &column);
+                along.column_mut(k).fill(0.0);
+            }
+        }
+        (out, along)
+    }
+
+    /// Returns columns of the data, shape = (3 N, k) or (3 N + priors, k), after the fitted
+    /// parameters are projected out, shape = (3 N + priors, k).
     pub fn projected_out(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut remaining = columns.clone().resize_vertically(self.residual.len(), 0.0);
-        // The rows of the priors, below the data rows, are zero at first.
-        self.subtract_components(&mut remaining, self.rows);
+        self.subtract_components(&mut remaining, columns.nrows());
         let is_short = |k: &usize| {
             remaining.column(*k).norm() < MIN_PART_OF_ONE_PROJECTION * columns.column(*k).norm()
         };
@@ -416,6 +443,24 @@ mod tests {
         let blocks: Vec<usize> = (0..10).map(|pose| pose / 2).collect();
         let [one, other] = [with, whole].map(|fit| fit.cross_validate(&blocks).unwrap());
         assert!((one / other - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn columns_with_components_have_the_products_of_projected_ones() {
+        let (columns, residual, unknowns) = fit(4);
+        let fit = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
+        let mut tried = matrix(30, 7);
+        tried.set_column(2, &(columns.column(0) + matrix(30, 6).column(5) * 1e-3));
+        let (out, along) = fit.with_components(&tried);
+        let projected = fit.projected_out(&tried);
+        assert!(
+            (projected.tr_mul(&projected) - (out.tr_mul(&out) - along.tr_mul(&along))).amax()
+                < 1e-12
+        );
+        assert!(
+            (out.column(2) - projected.column(2)).amax() < 1e-14 && along.column(2).amax() == 0.0
+        );
+        assert!((fit.projected_out(&out) - projected).amax() < 1e-12);
     }
 
     #[test]

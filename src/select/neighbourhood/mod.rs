@@ -14,7 +14,7 @@ mod orthonormal;
 mod scan;
 mod score;
 
-pub(super) use left_out::PartSquares;
+pub(super) use left_out::{HatBlocks, PartSquares};
 pub(crate) use linear::{LinearNeighbourhood, Unknowns};
 pub(super) use linearised::Derivatives;
 pub(crate) use linearised::Linearised;

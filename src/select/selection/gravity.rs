@@ -1,11 +1,13 @@
 //! Gravity along another axis of the base than the problem declares, where joints that give way to
 //! loads would explain what is left.
 
+use std::cell::OnceCell;
+
 use nalgebra::Vector3;
 use serde_json::json;
 
 use super::state::SearchState;
-use crate::fit::{Finding, FindingCode};
+use crate::fit::{Finding, FindingCode, Options};
 use crate::problem::{Effect, Problem};
 use crate::quantity::format::mm;
 use crate::select::candidates::Candidates;
@@ -35,7 +37,8 @@ const MAX_NEGATIVE_SIGMAS: f64 = 3.0;
 /// of every joint in place of composed laws. Left-out poses must be predicted far better than by the
 /// same with the declared gravity, and not clearly worse than by the end of the search. A joint that gives
 /// way against its load shows a wrong direction. With the opposite of gravity, all joints do so and
-/// fit as well: the declared gravity is then compared without compliances.
+/// fit as well: the declared gravity is then compared without compliances. Provisional fits show
+/// which directions need a complete one.
 pub(super) fn other_gravity(
     state: &SearchState,
     declared: &Fitted,
@@ -51,33 +54,38 @@ pub(super) fn other_gravity(
     if compliances.is_empty() || state.affordable_fits(unknowns) < TRIALS {
         return None;
     }
-    let with = |gravity: Vector3<f64>, compliances: &[Effect]| {
+    let with = |gravity: Vector3<f64>, compliances: &[Effect], provisional: bool| {
         let effects = [others.as_slice(), compliances].concat();
         let problem = Problem { gravity, ..state.problem(declared, &effects) };
         let options = declared.warm_started_options(state.options, true);
-        declared.fit_other(problem, data, &options).ok()
+        declared.fit_other(problem, data, &Options { provisional, ..options }).ok()
     };
     let as_declared = declared.problem.gravity;
-    let known = with(as_declared, &compliances)?;
-    let upwards = giving_way(&known, &compliances, -MAX_NEGATIVE_SIGMAS);
-    let known = if upwards.is_empty() { known } else { with(as_declared, &[])? };
+    let first = with(as_declared, &compliances, true)?;
+    let upwards = giving_way(&first, &compliances, -MAX_NEGATIVE_SIGMAS);
+    let as_known = if upwards.is_empty() { compliances.as_slice() } else { &[] };
+    let first = if upwards.is_empty() { first } else { with(as_declared, as_known, true)? };
+    let known = OnceCell::new();
+    let known = || known.get_or_init(|| with(as_declared, as_known, false)).as_ref();
+    let ln_odds = |fitted: &Fitted, known: &Fitted| {
+        let gain = LeftOutGain::new(fitted, known, data)?;
+        gain.is_significant().then(|| gain.ln_odds(fitted.sigma))
+    };
     let directions = (0..3).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]);
     let trials = directions.filter_map(|(axis, sign)| {
         let gravity = Vector3::ith(axis, sign * as_declared.norm());
         if gravity.dot(&as_declared) > SAME_DIRECTION * as_declared.norm_squared() {
             return None;
         }
-        let fitted = with(gravity, &compliances)?;
-        let odds = |fitted: &Fitted| {
-            let gain = LeftOutGain::new(fitted, &known, data)?;
-            gain.is_significant().then(|| gain.ln_odds(fitted.sigma))
-        };
+        let fitted = with(gravity, &compliances, true)?;
         let soft = giving_way(&fitted, &compliances, MIN_COMPLIANCE_SIGMAS);
         let is_sound = giving_way(&fitted, &compliances, -MAX_NEGATIVE_SIGMAS).is_empty();
-        let is_better = !soft.is_empty() && is_sound && odds(&fitted)? > LN_ODDS_OF_DIRECTION;
+        if soft.is_empty() || !is_sound || ln_odds(&fitted, &first)? <= LN_ODDS_OF_DIRECTION {
+            return None;
+        }
         // Joints that do not give way would only add to the uncertainty.
-        let fitted = is_better.then(|| with(gravity, &soft)).flatten()?;
-        Some((odds(&fitted)?, gravity, fitted, soft))
+        let fitted = with(gravity, &soft, false)?;
+        Some((ln_odds(&fitted, known()?)?, gravity, fitted, soft))
     });
     let (_, gravity, best, soft) = trials.max_by(|one, other| one.0.total_cmp(&other.0))?;
     let against = LeftOutGain::new(end, &best, data)?.ln_odds(best.sigma.min(end.sigma));
@@ -87,7 +95,7 @@ pub(super) fn other_gravity(
     let axes: Vec<String> = gravity.iter().map(ToString::to_string).collect();
     let words = format!("gravity_m_s2 = [{}]", axes.join(", "));
     let error = |fitted: &Fitted| fitted.found.fitted.identification.rms.norm;
-    let (as_read, rest) = (error(&known), error(&best));
+    let (as_read, rest) = (error(known()?), error(&best));
     let is_opposite = gravity.dot(&as_declared) < -SAME_DIRECTION * as_declared.norm_squared();
     let other = if is_opposite { "the other way" } else { "along another axis of the base" };
     let as_declared = if upwards.is_empty() {
