@@ -305,3 +305,15 @@ fn a_sigma_in_radians_and_a_sign_of_rotation_vectors_are_named() {
     let named = remedy(&declared, &data).unwrap();
     assert!(named.contains("in radians: write 0.020"), "{named}");
 }
+
+#[test]
+fn a_probe_that_is_mounted_in_another_way_is_no_misread_table() {
+    let mounted = ur10();
+    let (_, data) = rig(&mounted, 50, 4, "");
+    let mut declared = mounted;
+    declared.tool.rotation = Vector3::new(0.0, 0.0, 10_f64.to_radians());
+    let found = fit(&declared, &data);
+    assert!(!found.has(FindingCode::Misread), "{:?}", found.findings);
+    let beyond = found.finding(FindingCode::BeyondPrior).unwrap().to_string();
+    assert!(beyond.starts_with("tool.r"), "{beyond}");
+}

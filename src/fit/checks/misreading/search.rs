@@ -209,10 +209,12 @@ impl<'a> Trial<'a> {
     }
 
     /// Returns the error of the declared problem that is fitted to the chosen rows alone, from the
-    /// parameters of the fit \[m\]. A fit to few rows follows their errors more closely, with or
-    /// without a misreading. Infinity if all rows are chosen, or if the fit fails.
+    /// parameters of the fit \[m\]. A fit to few rows follows their errors more closely, and one
+    /// without orientations need not follow these, with or without a misreading. Infinity if the fit
+    /// itself is such a fit, or if it fails.
     pub(super) fn refitted_error(&self, fit: &CheckedFit) -> f64 {
-        if self.chosen.len() == self.fitting.split.identification.len() {
+        let are_all_chosen = self.chosen.len() == self.fitting.split.identification.len();
+        if are_all_chosen && self.fitting.turn_sigma.is_none() {
             return f64::INFINITY;
         }
         let refitted =
