@@ -10,10 +10,10 @@ use crate::numeric::parallel;
 
 /// Maximum number of rows, evenly spaced, by which the misreadings are ranked.
 const MAX_RANKED_ROWS: usize = 40;
-/// Number of solver steps by which they are ranked.
-const RANKING_STEPS: u64 = 2;
-/// Maximum number of misreadings that are fitted in full.
-const MAX_FITTED: usize = 4;
+/// Rounds of the ranking: solver steps of each fit, and the number of misreadings that remain. Those
+/// of the last round are fitted in full. A fit to wrong loads is many steps from that to the right
+/// ones.
+const ROUNDS: [(u64, usize); 2] = [(2, 16), (10, 4)];
 
 impl CheckedFit<'_> {
     /// Returns the masses in another unit or at another place that leave at most `limit` \[m\]. For a
@@ -48,10 +48,9 @@ pub(in crate::fit) fn misread_masses(
     let shifts = [-1, 1].map(|by| Misreading::ShiftedPayload { by });
     tested.extend(shifts.into_iter().filter(|_| has_payloads));
     let (few, end) = (Trial::with_rows(fit, MAX_RANKED_ROWS), &fit.end.x);
-    let error = |&misreading: &Misreading| {
+    let error = |&misreading: &Misreading, steps: u64| {
         let error = few.with_corrected(misreading, false, |fitting, _| {
-            let steps = Some(RANKING_STEPS);
-            let fitting = Fitting { max_steps: steps, ..fitting.with_declared_noise() };
+            let fitting = Fitting { max_steps: Some(steps), ..fitting.with_declared_noise() };
             if fitting.model.parameters.len() != end.len() {
                 return None;
             }
@@ -64,13 +63,14 @@ pub(in crate::fit) fn misread_masses(
         })?;
         error.is_finite().then_some((misreading, error))
     };
-    let mut ranked: Vec<(Misreading, f64)> =
-        parallel::map_items(&tested, error).into_iter().flatten().collect();
-    ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let chosen: Vec<Misreading> =
-        ranked.into_iter().map(|(misreading, _)| misreading).take(MAX_FITTED).collect();
+    for (steps, left) in ROUNDS {
+        let ranked = parallel::map_items(&tested, |misreading| error(misreading, steps));
+        let mut ranked: Vec<(Misreading, f64)> = ranked.into_iter().flatten().collect();
+        ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
+        tested = ranked.into_iter().map(|(misreading, _)| misreading).take(left).collect();
+    }
     let trial = Trial::new(fit);
     let as_read = trial.error_as_read(fit);
-    let fitted = trial.explained(&chosen, limit.min(as_read).min(trial.refitted_error(fit)));
+    let fitted = trial.explained(&tested, limit.min(as_read).min(trial.refitted_error(fit)));
     Explanations { fitted, as_read, ..Explanations::default() }
 }
