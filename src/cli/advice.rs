@@ -96,7 +96,7 @@ pub fn after_fit(
                  right, flexcal loop {named} looks for what the model lacks"
             )
         }
-        None if found.has(FindingCode::Misread) => format!(
+        None if found.has(FindingCode::Misread) || has_wrong_noise_or_loads(found) => format!(
             "correct the table or {file} as the warning says, then flexcal identify {named}"
         ),
         None if found.has(FindingCode::LensContradicted) => format!(
@@ -129,15 +129,6 @@ pub fn after_fit(
             "declare the place of the payload in {file} as the warning says, then flexcal \
              identify {named}"
         ),
-        // A σ in another unit, or loads that the table lacks.
-        None if found
-            .finding(FindingCode::NoiseBeyondDeclared)
-            .is_some_and(|noise| !noise.remedy.contains("flexcal")) =>
-        {
-            format!(
-                "correct the table or {file} as the warning says, then flexcal identify {named}"
-            )
-        }
         None if found.has(FindingCode::StrategyMisfit)
             || found.has(FindingCode::NoiseBeyondDeclared) =>
         {
@@ -188,6 +179,13 @@ fn widen_prior(found: &Identification, file: &str) -> String {
         "give \"{rule}\" in {file} a larger σ, or check the nominal values of these parameters and \
          their units"
     )
+}
+
+/// Returns true if the residual is far beyond the declared σ because σ is in another unit or the
+/// table lacks loads.
+fn has_wrong_noise_or_loads(found: &Identification) -> bool {
+    let noise = found.finding(FindingCode::NoiseBeyondDeclared);
+    noise.is_some_and(|noise| !noise.remedy.contains("flexcal"))
 }
 
 /// Returns true if a held number of a point, an anchor or a surface causes the misfit.
