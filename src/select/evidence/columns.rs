@@ -39,8 +39,8 @@ pub(super) struct Columns<'a, 'l> {
     /// Number of poses on which evidence is evaluated, the first ones. At the other poses,
     /// functions are only predicted.
     pub evidence_poses: usize,
-    /// Only hypothesis whose functions are built; `None` builds all.
-    only: Option<&'a Hypothesis>,
+    /// Only hypotheses whose functions are built; `None` builds all.
+    only: Option<&'a [Hypothesis]>,
     /// Candidates built so far; their prior probabilities are set last.
     pub candidates: Vec<Candidate>,
     /// For each candidate, its family and its prior weight relative to the others of the family.
@@ -53,7 +53,7 @@ pub(super) struct Columns<'a, 'l> {
 
 impl<'a, 'l> Columns<'a, 'l> {
     /// Builds the candidates: effects with their columns, and functions without a law; if `only` is
-    /// given, only the functions of that hypothesis.
+    /// given, only the functions of these hypotheses.
     ///
     /// Returns the candidates, the covariates of the functions, ln of the prior probability of one
     /// family of effects, and the properties of all hypotheses on which the prior of one depends.
@@ -62,9 +62,35 @@ impl<'a, 'l> Columns<'a, 'l> {
         linearised: &'a Linearised<'l>,
         (coverage, admits_common_prior, evidence_poses): ((bool, bool), bool, usize),
         effects: &[(Effect, DMatrix<f64>)],
-        only: Option<&'a Hypothesis>,
+        only: Option<&'a [Hypothesis]>,
     ) -> (Vec<Candidate>, Vec<SampledCovariate>, f64, OtherHypotheses) {
-        let mut new_columns = Self {
+        let measured = (coverage, admits_common_prior, evidence_poses);
+        let mut new_columns = Self::new(problem, linearised, measured, only);
+        new_columns.add_effects(effects);
+        new_columns.add_functions();
+        new_columns.into_candidates()
+    }
+
+    /// Builds the functions of the hypotheses `only`, with the prior probabilities that they have
+    /// among `families`.
+    pub fn functions(
+        problem: &'a Problem,
+        linearised: &'a Linearised<'l>,
+        measured: ((bool, bool), bool, usize),
+        (only, families): (&'a [Hypothesis], &Families),
+    ) -> Vec<Candidate> {
+        let mut new_columns = Self::new(problem, linearised, measured, Some(only));
+        new_columns.add_functions();
+        new_columns.candidates_among(families)
+    }
+
+    fn new(
+        problem: &'a Problem,
+        linearised: &'a Linearised<'l>,
+        (coverage, admits_common_prior, evidence_poses): ((bool, bool), bool, usize),
+        only: Option<&'a [Hypothesis]>,
+    ) -> Self {
+        Self {
             problem,
             linearised,
             coverage,
@@ -75,10 +101,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             shares: Vec::new(),
             unseen: Vec::new(),
             covariates: Vec::new(),
-        };
-        new_columns.add_effects(effects);
-        new_columns.add_functions();
-        new_columns.into_candidates()
+        }
     }
 
     /// Adds a function without a law; `share` is its prior weight relative to the others of its
@@ -100,7 +123,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         hypothesis: Hypothesis,
         design: impl FnOnce() -> Design,
     ) {
-        if self.only.is_some_and(|only| *only != hypothesis) {
+        if self.only.is_some_and(|only| !only.contains(&hypothesis)) {
             return;
         }
         // A candidate whose columns are zero is not added.
@@ -432,19 +455,24 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     /// Returns the result of [`Self::all`] once all candidates are added.
-    fn into_candidates(self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64, OtherHypotheses) {
+    fn into_candidates(mut self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64, OtherHypotheses) {
         let mut families = Families::default();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
             families.add(family, *share, candidate.hypothesis.effect());
         }
-        let total_weight = families.weight(false);
-        let mut candidates = self.candidates;
-        for (candidate, (family, share)) in candidates.iter_mut().zip(&self.shares) {
+        let unseen = std::mem::take(&mut self.unseen);
+        let covariates = std::mem::take(&mut self.covariates);
+        let others = OtherHypotheses { functions: families.functions(), unseen };
+        (self.candidates_among(&families), covariates, ln_family(families.weight()), others)
+    }
+
+    /// Returns the candidates with the prior probabilities that they have among `families`.
+    fn candidates_among(mut self, families: &Families) -> Vec<Candidate> {
+        let total_weight = families.weight();
+        for (candidate, (family, share)) in self.candidates.iter_mut().zip(&self.shares) {
             candidate.ln_prior = families.ln_prior(family, *share, total_weight);
         }
-        let weight_of_functions = families.weight(true);
-        let others = OtherHypotheses { weight_of_functions, unseen: self.unseen };
-        (candidates, self.covariates, ln_family(total_weight), others)
+        self.candidates
     }
 }
 

@@ -20,12 +20,12 @@ struct Family {
     is_of_functions: bool,
 }
 
-/// Summary of the hypotheses about a residual, from which the prior probability of an effect among
-/// them follows without their columns.
+/// Summary of the hypotheses about a residual, from which the prior probability of one among them
+/// follows without the columns of the others.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct OtherHypotheses {
-    /// Sum of the weights of the families of functions without a law.
-    pub weight_of_functions: f64,
+    /// Families of functions without a law, each with the sum of the shares of its members.
+    pub functions: Vec<(String, f64)>,
     /// Effects that displace no pose and are therefore no hypotheses.
     pub unseen: Vec<Effect>,
 }
@@ -47,11 +47,16 @@ impl Families {
         self.0.push(Family { name: name.to_owned(), weight, shares: share, is_of_functions });
     }
 
-    /// Returns the sum of the weights of all families, or of those of functions without a law if
-    /// `of_functions_only` is true.
-    pub fn weight(&self, of_functions_only: bool) -> f64 {
-        let is_included = |family: &&Family| family.is_of_functions || !of_functions_only;
-        self.0.iter().filter(is_included).map(|family| family.weight).sum()
+    /// Returns the sum of the weights of all families.
+    pub fn weight(&self) -> f64 {
+        self.0.iter().map(|family| family.weight).sum()
+    }
+
+    /// Returns the families of functions without a law, each with the sum of the shares of its
+    /// members.
+    pub fn functions(&self) -> Vec<(String, f64)> {
+        let functions = self.0.iter().filter(|family| family.is_of_functions);
+        functions.map(|family| (family.name.clone(), family.shares)).collect()
     }
 
     /// Returns ln of the prior probability of a hypothesis with this `share` of the family `name`,
@@ -110,7 +115,7 @@ mod tests {
             families.add(effect.name(), share(&effect, 1.0, &problem), Some(&effect));
         }
         let ln = |effect: Effect| {
-            families.ln_prior(effect.name(), share(&effect, 1.0, &problem), families.weight(false))
+            families.ln_prior(effect.name(), share(&effect, 1.0, &problem), families.weight())
         };
         let over = |other: Effect| (ln(Effect::GearRatio { joint: 1 }) - ln(other)).exp();
         assert!((over(Effect::TrackerScale) - 5.0).abs() < 1e-9);

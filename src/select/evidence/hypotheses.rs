@@ -7,7 +7,7 @@ use super::candidate::{Candidate, joint_and_order, scaled_to_equal_length};
 use super::columns::{Columns, candidate_of};
 use super::families::{Families, OtherHypotheses, ln_family, share};
 use super::functions::{SampledCovariate, Shape};
-use super::hypothesis::{Hypothesis, HypothesisSet};
+use super::hypothesis::{Hypothesis, HypothesisKind, HypothesisSet};
 use super::limits::limits;
 use super::marginal::Coefficients;
 use super::sites::hypothesis_sites;
@@ -106,13 +106,13 @@ impl<'a> Hypotheses<'a> {
     }
 
     /// Creates the hypotheses of listed effects with their columns, and those without a law; if
-    /// `only` is given, only the functions of that hypothesis.
+    /// `only` is given, only the functions of these hypotheses.
     fn listed(
         fitted: &Fitted,
         data: &Data,
         linearised: Linearised<'a>,
         evidence_poses: usize,
-        (effects, only): (&[WithColumns], Option<&Hypothesis>),
+        (effects, only): (&[WithColumns], Option<&[Hypothesis]>),
     ) -> Self {
         let coverage = coverage(&linearised, data);
         let (candidates, covariates, ln_family, others) = Columns::all(
@@ -182,27 +182,32 @@ impl<'a> Hypotheses<'a> {
     ) -> Self {
         let linearised =
             fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
-        Self::listed(fitted, data, linearised, evidence_poses, (&[], Some(of)))
+        let only = Some(std::slice::from_ref(of));
+        Self::listed(fitted, data, linearised, evidence_poses, (&[], only))
     }
 
-    /// Creates the hypotheses of the effects `added` alone, with the prior probabilities that they
-    /// have among all hypotheses. The weight of functions without a law, and the effects that
-    /// displace no pose, are those at another fit, `others`. Returns `None` if an effect is a wave,
-    /// which needs the columns of other waves.
-    pub(super) fn of_added(
+    /// Creates the hypotheses of the effects `added` and of some `functions` without a law alone,
+    /// with the prior probabilities that they have among all hypotheses. The families of functions,
+    /// and the effects that displace no pose, are those at another fit, `others`. Returns `None` if
+    /// an effect is a wave, which needs the columns of other waves, or a function a wrong limit.
+    pub(super) fn of_set(
         fitted: &'a Fitted,
         data: &Data<'a>,
-        (added, others): (&[Effect], &OtherHypotheses),
+        (added, functions, others): (&[Effect], &[Hypothesis], &OtherHypotheses),
         rows: &[usize],
     ) -> Option<Self> {
         let problem = &fitted.problem;
         let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
-        if added.iter().any(|effect| joint_and_order(effect).is_some()) {
+        let is_limit = |of: &Hypothesis| matches!(of.kind, HypothesisKind::Limit(_));
+        if added.iter().any(|effect| joint_and_order(effect).is_some())
+            || functions.iter().any(is_limit)
+        {
             return None;
         }
         let columns_of_part: Vec<Vec<usize>> =
             added.iter().map(|part| fitted.unknowns_of(part)).collect();
-        let linearised = fitted.linearised_at(data, rows, &[]);
+        let sites = if functions.is_empty() { Vec::new() } else { hypothesis_sites(problem) };
+        let linearised = fitted.linearised_with(data, rows, &[], &sites);
         let (unlisted, listed_added) =
             split_unlisted(columns_of_added(&linearised, (&added, &columns_of_part)));
         let (coverage, evidence_poses) = (coverage(&linearised, data), rows.len());
@@ -230,10 +235,18 @@ impl<'a> Hypotheses<'a> {
                 families.add(effect.name(), share, Some(effect));
             }
         }
-        let total_weight = families.weight(false) + others.weight_of_functions;
+        for (name, shares) in &others.functions {
+            families.add(name, *shares, None);
+        }
+        let total_weight = families.weight();
         for (candidate, share) in added_candidates.iter_mut().zip(shares) {
             let name = candidate.hypothesis.effect().map_or("", Effect::name);
             candidate.ln_prior = families.ln_prior(name, share, total_weight);
+        }
+        if !functions.is_empty() {
+            let measured = (coverage, data.admits_common_prior, evidence_poses);
+            let of = (functions, &families);
+            added_candidates.extend(Columns::functions(problem, &linearised, measured, of));
         }
         let mut hypotheses = Self {
             linearised,

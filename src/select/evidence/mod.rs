@@ -80,13 +80,11 @@ pub(super) fn ln_posterior(
     (functions, sigma): (&[(Hypothesis, usize)], f64),
 ) -> Option<f64> {
     let rows = data.evidence_rows();
-    let of_effects = if functions.is_empty() {
-        Hypotheses::of_added(fitted, data, (added, &evidence.others), &rows)
-    } else {
-        None
-    };
-    let hypotheses =
-        of_effects.unwrap_or_else(|| Hypotheses::new(fitted, data, added, &rows, rows.len()));
+    let of_functions: Vec<Hypothesis> =
+        functions.iter().map(|(function, _)| function.clone()).collect();
+    let of_set = (added, of_functions.as_slice(), &evidence.others);
+    let hypotheses = Hypotheses::of_set(fitted, data, of_set, &rows)
+        .unwrap_or_else(|| Hypotheses::new(fitted, data, added, &rows, rows.len()));
     let is_in_set = |candidate: &&Candidate| match candidate.hypothesis.effect() {
         Some(effect) => hypotheses.added.contains(effect),
         None => functions.iter().any(|(function, variant)| {
