@@ -8,8 +8,8 @@ use thiserror::Error;
 use super::NoRows;
 use super::near::{is_it_rather, key_suggestion, pattern_suggestion, suggestion};
 use super::phrases::{
-    and_more, behind_camera_remedy, decimal_comma_hint, joined_list, near_quote, plural,
-    stiffness_units, windows_path_hint, with_remedy,
+    behind_camera_remedy, decimal_comma_hint, joined_list, near_quote, plural, stiffness_units,
+    windows_path_hint, with_remedy,
 };
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
@@ -420,15 +420,9 @@ pub enum InputErrorKind {
     NoEquilibrium,
     #[error(
         "the nominal arm has no equilibrium under its loads here; the mass {name} of {mass} kg is \
-         {ratio} times as heavy as all others together: check its unit (kg)"
+         {how}: check its unit (kg)"
     )]
-    HeavyMass { name: String, mass: String, ratio: String },
-    #[error(
-        "the nominal arm has no equilibrium under its loads here; {name} of {mass} kg{} too heavy \
-         for a part of an arm: check the unit (if these are grams, divide by 1000)",
-        if *others == 0 { " is".to_owned() } else { format!("{} are", and_more(*others)) }
-    )]
-    HeavyBody { name: String, mass: String, others: usize },
+    HeavyMass { name: String, mass: String, how: String },
     #[error(
         "the nominal arm has no equilibrium under its loads here; {joint} may be too soft: gravity \
          on the masses beyond it has a moment of up to {moment} N·m, which could turn it by up to {angle} \

@@ -196,12 +196,8 @@ fn fit_rows(
         earlier: options.earlier.as_deref(),
     };
     if let Some(error) = fitting.unpredictable() {
-        let error = with_readings(
-            &fitting,
-            problem,
-            problem.with_soft_joint(error, measurements.largest_payload()),
-        );
-        return Err(error.into());
+        let error = problem.with_soft_joint(error, measurements.largest_payload());
+        return Err(with_readings(&fitting, problem, error).into());
     }
     let unknowns = fitted_parameters(&fitting)?;
     let (start, registered) =

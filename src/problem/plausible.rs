@@ -261,10 +261,14 @@ impl Problem {
         let masses = self.joints.iter().flat_map(Joint::named_masses);
         let mut heavy = masses.filter(|(_, mass)| *mass > MAX_BODY_MASS);
         let (name, mass) = heavy.next()?;
-        Some(InputErrorKind::HeavyBody {
+        let others = match heavy.count() {
+            0 => String::new(),
+            others => format!(", as are {others} other masses"),
+        };
+        Some(InputErrorKind::HeavyMass {
             name: name.to_owned(),
             mass: two_digits(mass, 3),
-            others: heavy.count(),
+            how: format!("too heavy for a part of an arm{others}"),
         })
     }
 
@@ -277,7 +281,7 @@ impl Problem {
         (ratio.is_finite() && ratio > MAX_MASS_RATIO).then(|| InputErrorKind::HeavyMass {
             name: name.to_owned(),
             mass: two_digits(mass, 3),
-            ratio: two_digits(ratio, 0),
+            how: format!("{} times as heavy as all others together", two_digits(ratio, 0)),
         })
     }
 

@@ -212,7 +212,7 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
                 b.edit(PROBLEM, "mass_kg = ", "mass_kg = 10000");
                 b.edit(PROBLEM, "5.2e4", "1.0");
             },
-            &["equilibrium", "kg", "if these are grams, divide by 1000"],
+            &["equilibrium", "check its unit (kg)"],
         ),
     ];
     for (what, spoil, expected) in mistakes {

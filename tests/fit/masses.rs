@@ -8,7 +8,8 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::common::arms::parse;
-use crate::common::made::{at_random, divided, fit_as_command, measure, model_of};
+use crate::common::made::{at_random, divided, fit, fit_as_command, measure, model_of};
+use crate::trusted::simulated;
 
 /// Noise of a coordinate [m].
 const SIGMA: f64 = 4e-5;
@@ -151,4 +152,24 @@ fn gravity_of_the_wrong_sign_is_named_where_stiffnesses_are_declared() {
         let words = finding.unwrap_or_else(|| panic!("{:?}", found.findings)).to_string();
         assert!(words.contains("gravity that points along −z"), "{words}");
     }
+}
+
+#[test]
+fn an_arm_that_bends_against_its_load_is_named() {
+    let arm = "name = 'arm'\n[[joint]]\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.8\n\
+               [tool]\ntarget_m = [0.5, 0.1, 0]\npayload_kg = 8\n\
+               [data]\nposition_sigma_mm = 0.02\n\
+               [parameters]\n'joint*.theta' = { sigma_deg = 0.3 }\n\
+               [[effect]]\njoint-compliance = { joint = 2 }\n";
+    let problem = parse(arm);
+    let data = simulated(&problem, &[("joint-compliance[2].compliance", 4e-5)], [40, 15], 21);
+    let upright = fit(&problem, &data);
+    assert!(upright.is_trusted() && !upright.has(FindingCode::GivesWayUpwards));
+    let mut inverted = problem.clone();
+    inverted.gravity = -problem.gravity;
+    let found = fit(&inverted, &data);
+    let finding = found.finding(FindingCode::GivesWayUpwards).unwrap();
+    assert_eq!(finding.word("parameter"), Some("joint-compliance[2].compliance"));
+    assert!((finding.number("compliance").unwrap() + 4e-5).abs() < 2e-6, "{finding}");
+    assert!(finding.remedy.contains("write gravity_m_s2 = [0, 0, -9.80665]"), "{finding}");
 }
