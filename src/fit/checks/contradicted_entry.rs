@@ -46,20 +46,17 @@ pub(super) fn contradicted_entry(
     deviation: (&Parameter, f64),
     is_far: impl Fn(&Parameter, f64) -> bool,
 ) -> Option<ContradictedEntry> {
-    single_entry(fit, deviation, is_far)
-        .or_else(|| exchanged_targets(fit, deviation.0))
-        .or_else(|| freed_target(fit))
+    single_entry(fit, deviation, is_far).or_else(|| freed_target(fit))
 }
 
-/// Returns the entry of the target of `parameter` if it is fitted where another target of the same
-/// joint is declared, and that one where this target is declared.
-fn exchanged_targets(fit: &CheckedFit, parameter: &Parameter) -> Option<ContradictedEntry> {
-    let ParameterSite::Target { target, axis: 0..3 } = parameter.site else { return None };
+/// Returns the names of two targets of one joint of which each is fitted where the other one is
+/// declared; `None` if there are none.
+pub(super) fn exchanged_targets<'a>(fit: &CheckedFit<'a>) -> Option<[&'a str; 2]> {
     let names = &fit.fitting.placement.targets;
-    // The targets of the rows have another order than those of the problem.
-    let declared = |name: &String| fit.problem.targets.iter().find(|target| target.name == *name);
     let fitted = |target: usize| {
-        let declared = declared(names.get(target)?)?;
+        // The targets of the rows have another order than those of the problem.
+        let mut declared = fit.problem.targets.iter();
+        let declared = declared.find(|declared| declared.name == names[target])?;
         let mut place = declared.at;
         for (parameter, x) in fit.fitting.model.parameters.iter().zip(&fit.end.x) {
             match parameter.site {
@@ -71,20 +68,17 @@ fn exchanged_targets(fit: &CheckedFit, parameter: &Parameter) -> Option<Contradi
         }
         Some((declared, place))
     };
-    let (first, place) = fitted(target)?;
-    let others = (0..names.len()).filter(|&other| other != target).filter_map(fitted);
-    let is_exchanged = |(other, of_other): &(&Target, Vector3<f64>)| {
-        let limit = MAX_TARGET_MISMATCH * (first.at - other.at).norm();
-        first.joint == other.joint
-            && (place - other.at).norm() < limit
-            && (of_other - first.at).norm() < limit
-    };
-    let (other, _) = others.into_iter().find(is_exchanged)?;
-    let names = format!("\"{}\" and \"{}\"", first.name, other.name);
-    Some(ContradictedEntry {
-        words: format!("of the targets {names}, each is fitted where the other one is declared"),
-        remedy: format!("exchange {names} in the column target, or in [[target]]"),
-    })
+    let fitted: Vec<(&Target, Vector3<f64>)> = (0..names.len()).filter_map(fitted).collect();
+    let pairs = (0..fitted.len()).flat_map(|first| (0..first).map(move |other| [other, first]));
+    pairs.map(|pair| pair.map(|place| fitted[place])).find_map(
+        |[(one, place), (other, of_other)]| {
+            let limit = MAX_TARGET_MISMATCH * (one.at - other.at).norm();
+            let is_exchanged = one.joint == other.joint
+                && (place - other.at).norm() < limit
+                && (of_other - one.at).norm() < limit;
+            is_exchanged.then_some([one.name.as_str(), other.name.as_str()])
+        },
+    )
 }
 
 /// Returns the declared target if a fit without its prior explains the measurements and leaves all

@@ -1,9 +1,11 @@
 //! Check of intrinsics of cameras that the fit does not vary: their errors would be attributed to
 //! the arm.
 
-use nalgebra::{Matrix6, Vector6};
+use std::collections::BTreeMap;
+
+use nalgebra::{DVector, Matrix6, Vector6};
 use serde_json::json;
-use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
 use super::finding::Finding;
 use super::freed::Freed;
@@ -20,9 +22,9 @@ use crate::problem::{CENTRE_X, FIRST_COEFFICIENT, Fixture, Freedom, Problem};
 const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
 /// Smallest p-value that is stated as a number; smaller ones are below the rounding errors.
 const LEAST_STATED_CHANCE: f64 = 1e-16;
-/// Smallest deviation of an intrinsic parameter from its declared value, in standard errors, at
-/// which the finding names the parameter.
-const MIN_NAMED_SIGMAS: f64 = 3.0;
+/// Largest probability that chance makes the parameters of one kind, such as the radial distortion,
+/// deviate together as far as they do, at which the finding names them.
+const MAX_NAMED_CHANCE: f64 = 1e-3;
 /// Smallest ratio of the decrease of χ² by free intrinsics to the χ² that remains beyond noise, at
 /// which the intrinsics are the cause. They then remove three quarters of the misfit.
 const MIN_GAIN_RATIO: f64 = 3.0;
@@ -88,14 +90,7 @@ pub(in crate::fit) fn lens_finding(
     if !explains && shown.is_none() {
         return None;
     }
-    let sigmas = |estimate: &Estimate| {
-        let deviation = (estimate.estimate - estimate.nominal).abs();
-        estimate.std_error.filter(|_| fixed.contains(&estimate.name)).map(|error| deviation / error)
-    };
-    let largest = other.estimates.iter().filter_map(sigmas).fold(0.0, f64::max);
-    let limit = MIN_NAMED_SIGMAS.min(largest);
-    let is_off = |estimate: &&Estimate| sigmas(estimate).is_some_and(|sigmas| sigmas >= limit);
-    let off: Vec<&Estimate> = other.estimates.iter().filter(is_off).collect();
+    let off = deviating(&other, &fixed);
     let words = off.iter().map(|estimate| {
         let error = estimate.std_error.unwrap_or_default();
         format!("{} = {:.6} ± {error:.6}", estimate.name, estimate.estimate)
@@ -129,6 +124,42 @@ pub(in crate::fit) fn lens_finding(
     let numbers = [json!(names), json!(before), json!(after)];
     let remedy = format!("{}, or declare better ones", freeing(problem, &fixed));
     Some(Finding::new(FindingCode::LensContradicted, numbers, text).with_remedy(remedy))
+}
+
+/// Returns the freed parameters of each kind that deviates from the declared values beyond chance, or
+/// of the one kind that deviates most.
+///
+/// Parameters of one kind are judged together, by the χ² of their deviations with their covariance:
+/// they make up for each other, so that each alone may have a large standard error.
+fn deviating<'a>(found: &'a Identification, freed: &[String]) -> Vec<&'a Estimate> {
+    let mut kinds: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (place, &of) in found.covariance.parameters.iter().enumerate() {
+        let name = &found.estimates[of].name;
+        if freed.contains(name) {
+            // "camera[hand].k2" is of the kind "camera[hand].k".
+            let kind =
+                name.rfind('.').map_or(name.as_str(), |dot| &name[..(dot + 2).min(name.len())]);
+            kinds.entry(kind).or_default().push(place);
+        }
+    }
+    let chance = |places: &Vec<usize>| {
+        let of = |place: usize| &found.estimates[found.covariance.parameters[place]];
+        let covariance = found.covariance.matrix.select_rows(places).select_columns(places);
+        let deviations = places.iter().map(|&place| of(place).estimate - of(place).nominal);
+        let deviations = DVector::from_iterator(places.len(), deviations);
+        let chi2 = deviations.dot(&covariance.cholesky()?.solve(&deviations));
+        Some((ChiSquared::new(places.len() as f64).ok()?.sf(chi2), chi2))
+    };
+    let mut judged: Vec<(f64, f64, Vec<usize>)> = kinds
+        .into_values()
+        .filter_map(|places| chance(&places).map(|(chance, chi2)| (chance, chi2, places)))
+        .collect();
+    judged.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    let beyond = judged.iter().filter(|(chance, ..)| *chance <= MAX_NAMED_CHANCE).count();
+    let mut named: Vec<usize> =
+        judged.into_iter().take(beyond.max(1)).flat_map(|(.., places)| places).collect();
+    named.sort_unstable();
+    named.into_iter().map(|place| &found.estimates[found.covariance.parameters[place]]).collect()
 }
 
 /// States what frees the intrinsics `names` in `[parameters]`: lines that hold them and have to free

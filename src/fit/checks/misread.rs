@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
+use super::contradicted_entry::exchanged_targets;
 use super::finding::{Finding, FindingCode};
 use super::misreading::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_NOISE_SIGMAS, misread_masses};
 use super::nominal_error::is_nominal_far_off;
@@ -45,6 +46,9 @@ impl Check for ReadAsMeant {
         let kind = fit.kind(fit.fitting.measurements.leading());
         let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
         let rms = fit.rms(&kind.rows, &errors);
+        if let Some(names) = exchanged_targets(fit) {
+            return vec![exchanged_finding(names, rms)];
+        }
         let limit = match kind.declared_sigma {
             Some(sigma) => MIN_SIGMAS * kind.observation.expected_norm() * sigma,
             None => MIN_PART * kind.spread,
@@ -149,4 +153,17 @@ impl Check for ReadAsMeant {
         }
         vec![finding.with_remedy(remedy)]
     }
+}
+
+/// Creates the finding that the `names` of two targets are exchanged, at the rms residual `rms`
+/// \[m\] of the fit.
+fn exchanged_finding(names: [&str; 2], rms: f64) -> Finding {
+    let [one, other] = names;
+    let words = format!("targets \"{one}\" and \"{other}\" that are exchanged");
+    let text = format!(
+        "of the targets \"{one}\" and \"{other}\", each is fitted where the other one is declared"
+    );
+    let numbers = [json!([words]), rms.into(), rms.into()];
+    let remedy = "exchange their names in the column target, or in [[target]]";
+    Finding::new(FindingCode::Misread, numbers, text).with_remedy(remedy.to_owned())
 }
