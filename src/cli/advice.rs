@@ -62,6 +62,9 @@ pub fn after_fit(
         Strategy::OneSweep | Strategy::GeometryOnly | Strategy::StiffnessOnly => true,
         _ => false,
     };
+    let correct = || {
+        format!("correct the table or {file} as the warning says, then flexcal identify {named}")
+    };
     // A remainder in the problem comes from a loop, which has searched for causes already.
     let search = if is_partial {
         format!("flexcal identify {named} fits all parameters at once, elasticity included")
@@ -96,9 +99,7 @@ pub fn after_fit(
                  right, flexcal loop {named} looks for what the model lacks"
             )
         }
-        None if found.has(FindingCode::Misread) || has_wrong_noise_or_loads(found) => format!(
-            "correct the table or {file} as the warning says, then flexcal identify {named}"
-        ),
+        None if found.has(FindingCode::Misread) => correct(),
         None if found.has(FindingCode::LensContradicted) => format!(
             "correct or free the intrinsics in {file} as the warning says, then flexcal identify \
              {named}"
@@ -129,6 +130,7 @@ pub fn after_fit(
             "declare the place of the payload in {file} as the warning says, then flexcal \
              identify {named}"
         ),
+        None if found.doubts_unit_of_sigma() && !is_partial => correct(),
         None if found.has(FindingCode::StrategyMisfit)
             || found.has(FindingCode::NoiseBeyondDeclared) =>
         {
@@ -181,13 +183,6 @@ fn widen_prior(found: &Identification, file: &str) -> String {
     )
 }
 
-/// Returns true if the residual is far beyond the declared σ because σ is in another unit or the
-/// table lacks loads.
-fn has_wrong_noise_or_loads(found: &Identification) -> bool {
-    let noise = found.finding(FindingCode::NoiseBeyondDeclared);
-    noise.is_some_and(|noise| !noise.remedy.contains("flexcal"))
-}
-
 /// Returns true if a held number of a point, an anchor or a surface causes the misfit.
 fn holds_a_wrong_fixture(found: &Identification) -> bool {
     let held = found.finding(FindingCode::HeldParameter);
@@ -227,8 +222,8 @@ pub fn after_loop(
     }
     if result.is_contradicted() {
         return format!(
-            "look at the rows that the warnings name before anything is applied; if they are \
-             right, flexcal trace {named} ranks further candidates"
+            "follow the warnings on held-out rows before anything is applied; flexcal trace {named} \
+             ranks further candidates"
         );
     }
     // A plan can distinguish two effects if the ranges of the poses are known, and if the effects

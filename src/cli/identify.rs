@@ -5,6 +5,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
+use flexcal::error::WarningKind;
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
 use flexcal::life::{PriorError, Update, update};
 use flexcal::measurement::Dataset;
@@ -209,7 +210,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let is_structured = shown.residual_tests.is_structured();
         let estimate = results.path("estimate.json");
         let mut warnings = data.measurements.warnings.iter();
-        let next = if warnings.any(|warning| warning.kind.refutes_table()) {
+        let is_trusted = identification.is_trusted();
+        let is_cause =
+            |kind: &WarningKind| kind.refutes_table() || kind.says_that_loads_lack() && !is_trusted;
+        let next = if warnings.any(|warning| is_cause(&warning.kind)) {
             format!(
                 "correct the table as the warning says, then flexcal identify {}",
                 common.problem_arguments()

@@ -134,7 +134,9 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
             let sensitivity = site.sensitivity(&series, None);
             if let Some(row) = (0..sensitivity.len()).find(|&row| !sensitivity.is_finite(row)) {
                 let error = series.location(row).error(InputErrorKind::NoEquilibrium);
-                return Err(problem.with_soft_joint(error, series.largest_payload()).into());
+                return Err(problem
+                    .with_cause_of_overload(error, series.largest_payload(problem))
+                    .into());
             }
             (series, sensitivity)
         }

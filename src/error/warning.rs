@@ -376,6 +376,12 @@ impl WarningKind {
         )
     }
 
+    /// Returns true if the table lacks loads that the problem speaks of.
+    #[doc(hidden)]
+    pub const fn says_that_loads_lack(&self) -> bool {
+        matches!(self, Self::NoPayloadColumn { .. })
+    }
+
     /// Returns true if no arm can have been in the state that the table states.
     #[doc(hidden)]
     pub const fn refutes_table(&self) -> bool {

@@ -196,7 +196,7 @@ fn fit_rows(
         earlier: options.earlier.as_deref(),
     };
     if let Some(error) = fitting.unpredictable() {
-        let error = problem.with_soft_joint(error, measurements.largest_payload());
+        let error = problem.with_cause_of_overload(error, measurements.largest_payload(problem));
         return Err(with_readings(&fitting, problem, error).into());
     }
     let unknowns = fitted_parameters(&fitting)?;

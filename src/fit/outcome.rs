@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::fit::checks::finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, Severity};
 use crate::fit::checks::misreading::MisreadEffect;
+use crate::fit::checks::priors::UNIT_RATIOS;
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::stage::Stage;
@@ -188,6 +189,13 @@ impl Identification {
     /// Returns true if no finding is an error.
     pub fn is_trusted(&self) -> bool {
         self.first_error().is_none()
+    }
+
+    /// Returns true if the residual exceeds the declared σ by about the factor between two units.
+    #[doc(hidden)]
+    pub fn doubts_unit_of_sigma(&self) -> bool {
+        self.has(FindingCode::NoiseBeyondDeclared)
+            && UNIT_RATIOS.contains(&self.noise_factor.sqrt())
     }
 
     /// Returns true if the fit describes the measured arm well enough to search for effects. No

@@ -317,7 +317,7 @@ catalogue! {
     PayloadMass "payload-mass" => Family {
         terms: &[TermEntry::at(At::Arm(ArmField::Payload), "mass", 2.0)],
         says: "payloads weigh more or less than declared",
-        needs: &[Need::Payload, Need::GivesWay],
+        needs: &[Need::Payload, Need::OtherLoads],
         ..Family::PLAIN
     };
     /// Displacement of the payload's centre of mass from its declared position, in the frame that

@@ -212,6 +212,9 @@ pub enum Need {
     /// Requires that the problem declares a part that gives way. Otherwise an error of the loads
     /// shows only through causes that the search has added itself.
     GivesWay,
+    /// Requires a declared part that gives way, or other loads than one payload. With one payload
+    /// alone, only the product of its mass and a compliance that the search has added is known.
+    OtherLoads,
     /// Requires a payload that varies, and joints that approach from both sides.
     PayloadFromBothSides,
     /// Requires a joint that is approached from both sides. If no sides are recorded, loads must

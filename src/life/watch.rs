@@ -121,7 +121,10 @@ impl Watch {
         let ratio = (chi2 / coordinates).sqrt().max(MIN_UNEXPLAINED_RATIO);
         // Each left-out row is predicted with p changes that the n other coordinates determine, which
         // multiplies its variance by n / (n − p) on average.
-        let kept = (coordinates - cause.changes.len() as f64).max(0.0);
+        let kept = coordinates - cause.changes.len() as f64;
+        if kept <= 0.0 {
+            return None;
+        }
         let expected = (coordinates / kept).sqrt() * self.expected_error;
         (left > ratio * expected).then_some(left)
     }

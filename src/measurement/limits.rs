@@ -151,9 +151,11 @@ impl Measurements {
         self.lacks_payload(problem).then(|| self.warning(0, "payload_kg", kind))
     }
 
-    /// Returns the largest payload of the rows \[kg\]; 0 without a column of payloads.
-    pub(crate) fn largest_payload(&self) -> f64 {
-        self.payload.iter().flatten().copied().fold(0.0, f64::max)
+    /// Returns the largest payload of the rows \[kg\]: the one that `problem` declares without a column
+    /// of payloads.
+    pub(crate) fn largest_payload(&self, problem: &Problem) -> f64 {
+        let of_rows = |values: &Vec<f64>| values.iter().copied().fold(0.0, f64::max);
+        self.payload.as_ref().map_or(problem.tool.payload_mass, of_rows)
     }
 
     /// Returns a warning, located at the heaviest payload, if that is implausible for the arm.

@@ -115,6 +115,9 @@ const MAX_MASS_RATIO: f64 = 10.0;
 /// Largest plausible mass of one body of an arm \[kg\]. The heaviest industrial arms weigh some
 /// thousands of kilograms in all.
 const MAX_BODY_MASS: f64 = 1000.0;
+/// Largest mass of a part or of a payload with which an arm may be meant \[kg\]. The same number of
+/// grams is ten kilograms.
+const MAX_PLAUSIBLE_MASS: f64 = 1e4;
 /// Largest plausible size of gravity \[m/s²\]; that of Jupiter is 25.
 const MAX_GRAVITY: f64 = 30.0;
 /// Largest plausible rotation of an elastic joint by gravity \[rad\].
@@ -244,45 +247,39 @@ impl Problem {
     /// Returns the error of a pose without equilibrium with the name of the mass that is probably
     /// too heavy, or of the joint that is probably too soft; returns any other error as it is.
     /// `payload` is the largest payload of the rows \[kg\].
-    pub(crate) fn with_soft_joint(&self, error: InputError, payload: f64) -> InputError {
+    pub(crate) fn with_cause_of_overload(&self, error: InputError, payload: f64) -> InputError {
         match *error.kind {
             InputErrorKind::NoEquilibrium => {
-                let kind = self.heavy_body_error().or_else(|| self.heavy_mass_error(payload));
-                let kind = kind.or_else(|| self.soft_joint_error());
+                let kind = self.heavy_mass_error(payload).or_else(|| self.soft_joint_error());
                 error.location.error(kind.unwrap_or(InputErrorKind::NoEquilibrium))
             }
             kind => error.location.error(kind),
         }
     }
 
-    /// Returns an error that names the first part of an arm that is too heavy to be one, and counts
-    /// the others.
-    fn heavy_body_error(&self) -> Option<InputErrorKind> {
-        let masses = self.joints.iter().flat_map(Joint::named_masses);
-        let mut heavy = masses.filter(|(_, mass)| *mass > MAX_BODY_MASS);
-        let (name, mass) = heavy.next()?;
-        let others = match heavy.count() {
-            0 => String::new(),
-            others => format!(", as are {others} other masses"),
-        };
-        Some(InputErrorKind::HeavyMass {
-            name: name.to_owned(),
-            mass: two_digits(mass, 3),
-            how: format!("too heavy for a part of an arm{others}"),
-        })
-    }
-
-    /// Returns an error that names the mass that is more than [`MAX_MASS_RATIO`] times as heavy as
-    /// all others together, the payload of `payload` kg among them.
+    /// Returns an error that names the first mass beyond [`MAX_PLAUSIBLE_MASS`], the payload of
+    /// `payload` kg among them, or a part of the arm that is more than [`MAX_MASS_RATIO`] times as
+    /// heavy as all others together.
     fn heavy_mass_error(&self, payload: f64) -> Option<InputErrorKind> {
-        let masses = self.joints.iter().flat_map(Joint::named_masses).chain([("payload", payload)]);
-        let (name, mass) = masses.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let ratio = mass / (self.declared_mass() + payload - mass);
-        (ratio.is_finite() && ratio > MAX_MASS_RATIO).then(|| InputErrorKind::HeavyMass {
+        let parts = || self.joints.iter().flat_map(Joint::named_masses);
+        let mut beyond =
+            parts().chain([("payload", payload)]).filter(|(_, mass)| *mass > MAX_PLAUSIBLE_MASS);
+        let found = |(name, mass): (&str, f64), how: String| InputErrorKind::HeavyMass {
             name: name.to_owned(),
             mass: two_digits(mass, 3),
-            how: format!("{} times as heavy as all others together", two_digits(ratio, 0)),
-        })
+            how,
+        };
+        if let Some(first) = beyond.next() {
+            let how = match beyond.count() {
+                0 => "too heavy for an arm".to_owned(),
+                more => format!("too heavy for an arm, as {more} more"),
+            };
+            return Some(found(first, how));
+        }
+        let heaviest = parts().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let ratio = heaviest.1 / (self.declared_mass() - heaviest.1);
+        let how = || format!("{} times as heavy as all others together", two_digits(ratio, 0));
+        (ratio.is_finite() && ratio > MAX_MASS_RATIO).then(|| found(heaviest, how()))
     }
 
     /// Returns an error that names the joint that gravity would turn furthest, if by more than

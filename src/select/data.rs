@@ -149,6 +149,10 @@ impl<'a> Data<'a> {
             },
             approach: measurements.approach.is_some(),
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
+            is_one_payload: payload.as_ref().is_none_or(|values| {
+                let mut carried = values.iter().filter(|payload| **payload > 0.0);
+                carried.next().is_none_or(|first| carried.all(|payload| payload == first))
+            }),
             payload: payload.map_or([problem.tool.payload_mass; 2].into(), range),
             ranges: (0..n).map(column).collect(),
             covariates: self.declared_covariates().map(varies).collect(),

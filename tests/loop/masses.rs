@@ -90,3 +90,27 @@ fn a_compliance_under_a_payload_alone_is_found_and_no_error_of_the_payload() {
     let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
     assert_eq!(found, [&Effect::JointCompliance { joint: 3 }]);
 }
+
+#[test]
+fn an_error_of_the_payload_is_found_beside_joints_that_give_way_under_other_masses() {
+    let text = ON_A_WALL.replace("[tool]\n", "[tool]\npayload_at_m = [0.7, 0, 0.1]\n");
+    let problem = Problem::parse(&text, Path::new("problem.toml")).unwrap();
+    let truth = "[[effect]]\njoint-compliance = { joint = 2 }\ncompliance_rad_per_N_m = 2e-6\n\
+        [[effect]]\njoint-compliance = { joint = 3 }\ncompliance_rad_per_N_m = 3e-6\n\
+        [[effect]]\npayload-mass = true\nmass_kg = 6\n\
+        [random]\n'joint*.*' = { sigma_deg = 0.05, sigma_mm = 0.5 }\n[noise]\nposition_sigma_mm = 0.02\n\
+        [poses]\nq1_deg = [-160, 160]\nq2_deg = [-150, -10]\nq3_deg = [-80, 150]\npayload_kg = [0, 10]\n";
+    let truth = Truth::parse(truth, Path::new("TRUTH.toml"), &problem).unwrap();
+    let rows = simulate(&problem, &truth, 80, 5).unwrap().rows;
+    let split = Split { identification: (0..60).collect(), held_out: (60..80).collect() };
+    let closure = close(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap();
+    let mut found: Vec<String> =
+        closure.effects.iter().map(|found| found.effect.declaration()).collect();
+    found.sort();
+    let expected = [
+        "joint-compliance = { joint = 2 }",
+        "joint-compliance = { joint = 3 }",
+        "payload-mass = true",
+    ];
+    assert_eq!(found, expected);
+}

@@ -113,7 +113,7 @@ pub fn waypoints(
     match targets.positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
         Some(row) => {
             let error = rows.location(row).error(InputErrorKind::NoEquilibrium);
-            Err(problem.with_soft_joint(error, rows.largest_payload()))
+            Err(problem.with_cause_of_overload(error, rows.largest_payload(problem)))
         }
         None => Ok(targets),
     }

@@ -40,8 +40,8 @@ const MIN_NOISE_FREEDOM: f64 = 200.0;
 /// distortion. Returns a finding if errors of the intrinsics cause most of the misfit.
 ///
 /// Within the views, no error of the arm acts: there, free intrinsics show their errors whatever else
-/// is wrong ([`is_shown_within_views`]). Otherwise this requires two conditions. By an F test, the decrease of χ² by the freed parameters is larger
-/// than noise explains. The decrease is also several times the misfit that remains beyond the noise
+/// is wrong ([`is_shown_within_views`]). Otherwise this requires two conditions. By an F test, the
+/// decrease of χ² by the freed parameters is larger than noise explains. The decrease is also several times the misfit that remains beyond the noise
 /// of pixels. Otherwise the arm or a marker may be the cause, and free intrinsics only absorb a
 /// part of their error. The noise of pixels is that within views ([`noise_within_views`]), or else
 /// the declared one.
@@ -258,8 +258,9 @@ fn rules_in_words(names: &[String]) -> String {
 fn is_shown_within_views((before, after): (f64, f64), freedom: f64, count: f64) -> bool {
     let gain = (before - after) * freedom;
     let left = (after - 1.0) * freedom - REMAINING_SIGMAS * (2.0 * freedom).sqrt();
-    let ratio = gain.max(0.0) / (count * after);
-    let test = FisherSnedecor::new(count, (freedom - count).max(1.0));
+    let left_freedom = (freedom - count).max(1.0);
+    let ratio = gain.max(0.0) / count / (after * freedom / left_freedom);
+    let test = FisherSnedecor::new(count, left_freedom);
     let chance = test.map_or(1.0, |test| test.sf(ratio));
     chance <= MAX_CHANCE_PROBABILITY && gain > MIN_GAIN_RATIO * left
 }

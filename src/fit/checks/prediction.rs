@@ -20,8 +20,8 @@ const MAX_TESTED_ROWS: usize = 2048;
 /// the increase is significant.
 const MIN_DIFFERENCE: f64 = 2.0;
 /// Smallest ratio of the rms held-out error of the fitted arm to that of the registered nominal arm
-/// that is reported.
-const MIN_WORSENING: f64 = 1.01;
+/// that is more than a difference of rounding.
+const MIN_WORSENING: f64 = 1.0 + 1e-6;
 /// Minimum number of held-out rows from which the mean increase of squared errors is judged.
 const MIN_ROWS: usize = 6;
 

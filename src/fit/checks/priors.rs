@@ -94,7 +94,7 @@ const MAX_EQUAL_NOISE_FACTOR: f64 = 1.0 + 1e-9;
 pub(super) const MAX_NOISE_FACTOR: f64 = 1000.0;
 /// Ratios of the σ that the fit assumed to the declared one which suggest a unit wrong by a factor
 /// of 1000, for example metres entered under a key in millimetres.
-const UNIT_RATIOS: std::ops::Range<f64> = 600.0..1600.0;
+pub(in crate::fit) const UNIT_RATIOS: std::ops::Range<f64> = 600.0..1600.0;
 
 /// Checks that the noise σ that the fit assumed is not above the declared one.
 pub(super) struct NoiseIsDeclared;

@@ -1,8 +1,8 @@
 //! Candidates of a search: every effect of the catalogue that is conceivable on an arm.
 
 use super::coverage::{
-    DataCoverage, IS_RIGID, NO_LOADS, NO_TEMPERATURE, NO_TIMES, NO_TIMES_NOR_TEMPERATURE,
-    STANDS_STILL,
+    DataCoverage, IS_ONLY_LOAD, IS_RIGID, NO_LOADS, NO_TEMPERATURE, NO_TIMES,
+    NO_TIMES_NOR_TEMPERATURE, STANDS_STILL,
 };
 use super::place::slides;
 use crate::laws::{
@@ -254,6 +254,10 @@ impl Effect {
                 unless(data.has_payload() && data.has_gravity(), "no payload is carried")
             }
             Need::GivesWay => unless(data.gives_way, IS_RIGID),
+            Need::OtherLoads => unless(
+                data.gives_way || !data.is_one_payload || problem.declared_mass() > 0.0,
+                IS_ONLY_LOAD,
+            ),
             Need::PayloadFromBothSides => unless(
                 both_sides && data.payload_varies(),
                 "no payload that changes, or no approach from both sides",

@@ -15,6 +15,8 @@ pub struct DataCoverage {
     pub both_sides: Vec<bool>,
     /// Smallest and largest payload \[kg\].
     pub payload: (f64, f64),
+    /// True if all poses with a payload have the same one.
+    pub is_one_payload: bool,
     /// For each joint, smallest and largest command \[rad\] or \[m\].
     pub ranges: Vec<(f64, f64)>,
     /// Candidate times at which a station may have moved \[s\], ascending.
@@ -69,6 +71,10 @@ pub(super) const NO_LOADS: &str = "no gravity, so no loads";
 
 /// Reason why an error of the loads cannot be shown: loads move nothing on a rigid arm.
 pub(super) const IS_RIGID: &str = "no declared part gives way, so loads move nothing";
+
+/// Reason why an error of the payload's mass cannot be shown beside what gives way under it.
+pub(super) const IS_ONLY_LOAD: &str =
+    "one payload is the only load, so that only its product with what gives way is known";
 
 /// Optional columns that a set of measurements has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

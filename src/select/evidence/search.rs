@@ -21,7 +21,7 @@ const MAX_PAIRED_MEMBERS: usize = 6;
 /// Maximum number of passes that replace members of the most probable sets found so far.
 const MAX_EXCHANGES: usize = 4;
 
-/// Smallest probability of a set that a search returns. All other sets together have none.
+/// Smallest probability of a set that a search returns. All other sets together have less than 1e-12.
 const MIN_LISTED_PROBABILITY: f64 = 1e-20;
 
 /// Largest difference of ln posteriors that rounding alone causes between sets of the same members

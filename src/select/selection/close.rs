@@ -195,7 +195,7 @@ pub fn close_by(
     }
     let (conclusion, with_found) =
         with_found_alone(&state, &declared, conclusion, (interrupted, &unstoppable))?;
-    let Conclusion { fitted, evidence, residual_tests, effects, mut unexplained } = conclusion;
+    let Conclusion { fitted, evidence, residual_tests, mut effects, mut unexplained } = conclusion;
     if unexplained.is_empty() {
         unexplained.extend(unexplained::unlocated(&residual_tests));
     }
@@ -234,11 +234,15 @@ pub fn close_by(
     let mut with_orientations = fitted.problem.clone();
     with_orientations.data.fits_orientation = problem.data.fits_orientation;
     let orientations = orientation_finding(&with_orientations, &data, &unstoppable);
-    // A formula of the moments fits an arm that gives way under another gravity as well.
+    // A formula may fit an arm that gives way under another gravity as well.
     let has_formula = state.added(&fitted).iter().any(Effect::is_composed);
     let is_open = (verdict == Verdict::Unexplained || has_formula) && !interrupted;
     let gravity = is_open.then(|| other_gravity(&state, &declared, &fitted)).flatten();
     let verdict = if gravity.is_some() { Verdict::Unexplained } else { verdict };
+    if gravity.is_some() {
+        let composed = effects.iter_mut().filter(|found| found.effect.is_composed());
+        composed.for_each(|found| found.status = Status::Located);
+    }
     let mut after = fitted.found;
     after.findings.splice(0..0, orientations.into_iter().chain(gravity));
     if !interrupted {

@@ -14,8 +14,9 @@ use crate::select::candidates::Candidates;
 use crate::select::fitted::Fitted;
 use crate::select::left_out_gain::LeftOutGain;
 
-/// Number of fits of the search: with gravity as declared and along each axis, in both directions.
-const TRIALS: usize = 7;
+/// Largest number of fits of the search: provisional and complete ones, with gravity as declared (also
+/// without compliances that it contradicts) and along each axis in both directions.
+const TRIALS: usize = 15;
 /// Smallest cosine of the angle between two directions of gravity that count as one.
 const SAME_DIRECTION: f64 = 0.99;
 /// Smallest ln of the odds by which another direction of gravity must predict left-out poses better
@@ -36,9 +37,9 @@ const MAX_NEGATIVE_SIGMAS: f64 = 3.0;
 /// For each direction, the effects of the `end` of the search are fitted again, with a compliance
 /// of every joint in place of composed laws. Left-out poses must be predicted far better than by the
 /// same with the declared gravity, and not clearly worse than by the end of the search. A joint that gives
-/// way against its load shows a wrong direction. With the opposite of gravity, all joints do so and
-/// fit as well: the declared gravity is then compared without compliances. Provisional fits show
-/// which directions need a complete one.
+/// way against its load shows a wrong direction. With the opposite of gravity, joints do so and fit as
+/// well: the declared gravity is therefore compared without the compliances of such joints.
+/// Provisional fits show which directions need a complete one.
 pub(super) fn other_gravity(
     state: &SearchState,
     declared: &Fitted,
@@ -63,10 +64,11 @@ pub(super) fn other_gravity(
     let as_declared = declared.problem.gravity;
     let first = with(as_declared, &compliances, true)?;
     let upwards = giving_way(&first, &compliances, -MAX_NEGATIVE_SIGMAS);
-    let as_known = if upwards.is_empty() { compliances.as_slice() } else { &[] };
-    let first = if upwards.is_empty() { first } else { with(as_declared, as_known, true)? };
+    let mut others_give_way = compliances.clone();
+    others_give_way.retain(|compliance| !upwards.contains(compliance));
+    let first = if upwards.is_empty() { first } else { with(as_declared, &others_give_way, true)? };
     let known = OnceCell::new();
-    let known = || known.get_or_init(|| with(as_declared, as_known, false)).as_ref();
+    let known = || known.get_or_init(|| with(as_declared, &others_give_way, false)).as_ref();
     let ln_odds = |fitted: &Fitted, known: &Fitted| {
         let gain = LeftOutGain::new(fitted, known, data)?;
         gain.is_significant().then(|| gain.ln_odds(fitted.sigma))
@@ -85,7 +87,9 @@ pub(super) fn other_gravity(
         }
         // Joints that do not give way would only add to the uncertainty.
         let fitted = with(gravity, &soft, false)?;
-        Some((ln_odds(&fitted, known()?)?, gravity, fitted, soft))
+        let odds = ln_odds(&fitted, known()?)?;
+        let all_give_way = giving_way(&fitted, &soft, MIN_COMPLIANCE_SIGMAS).len() == soft.len();
+        (all_give_way && odds > LN_ODDS_OF_DIRECTION).then_some((odds, gravity, fitted, soft))
     });
     let (_, gravity, best, soft) = trials.max_by(|one, other| one.0.total_cmp(&other.0))?;
     let against = LeftOutGain::new(end, &best, data)?.ln_odds(best.sigma.min(end.sigma));
@@ -116,7 +120,8 @@ pub(super) fn other_gravity(
         mm(rest, 3)
     );
     let numbers = [json!([words]), as_read.into(), rest.into()];
-    let remedy = "write that in the problem if the arm is mounted so, and run flexcal loop again";
+    let remedy = "write that in the problem if the arm is mounted so, and run flexcal loop again; a \
+                  spring or counterweight that is not declared looks alike";
     Some(Finding { remedy: remedy.to_owned(), ..Finding::new(FindingCode::Misread, numbers, text) })
 }
 
