@@ -4,9 +4,10 @@
 use crate::select::settings::{DISPLACEMENTS, MAX_WIDE_COLUMNS};
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
-use super::marginal::{Coefficients, NoiseGrid, Normal, ln_likelihood_of_block};
+use super::marginal::{Coefficients, NoiseGrid, Normal, averaged, ln_likelihood_of_block};
+use super::wide_blocks::{Factors, is_wide};
 use crate::select::neighbourhood::LinearNeighbourhood;
 
 /// Columns A of a hypothesis: derivatives of the whitened residuals with respect to its
@@ -132,11 +133,13 @@ fn grouped_products(
 
 /// Columns of one hypothesis, with the fitted parameters projected out, and the logarithm of its
 /// prior probability.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(super) struct Block {
     columns: Columns,
     /// Products AᵀA and Aᵀr of the projected columns.
     normal: Normal,
+    /// Cached factors of AᵀA, if the block has many columns.
+    factors: Factors,
     /// ln of the prior probability of the hypothesis.
     pub ln_prior: f64,
     /// Prior on the coefficients of the columns.
@@ -213,6 +216,7 @@ impl Block {
             Self {
                 columns,
                 normal,
+                factors: Factors::default(),
                 ln_prior,
                 coefficients,
                 is_surface: false,
@@ -293,6 +297,27 @@ impl Block {
         (squares_and_freedom, without): ((f64, f64), f64),
         grid: &NoiseGrid,
     ) -> (f64, f64) {
+        let (along, residual_along) =
+            set.map_or((&[][..], None), |(along, residual)| (along, Some(residual)));
+        if let Normal::Dense { gram, product } = &self.normal
+            && self.coefficients.is_any()
+            && is_wide(product.len(), along.len() / product.len().max(1))
+        {
+            let mut product = product.clone();
+            let along = DMatrixView::from_slice(along, along.len() / product.len(), product.len());
+            if let Some(residual_along) = residual_along {
+                product.gemv_tr(-1.0, &along, residual_along, 1.0);
+            }
+            let at = |size: f64| {
+                let terms = self.factors.shrinkage_terms(gram, (along, &product), size);
+                terms.map_or(f64::NEG_INFINITY, |(determinant, explained)| {
+                    let squares = (squares_and_freedom.0 - explained).max(0.0);
+                    grid.ln_likelihood(squares) - determinant
+                })
+            };
+            let (with, size) = averaged(&DISPLACEMENTS, at);
+            return (with - without, size);
+        }
         let (with, size) = match set {
             None => self.ln_likelihood_over_sizes(&self.normal, squares_and_freedom, grid),
             Some((along, residual_along)) => self.ln_likelihood_over_sizes(

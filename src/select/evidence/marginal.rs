@@ -281,6 +281,11 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
+    /// Returns true if the coefficients act together and may have any sign and size.
+    pub fn is_any(&self) -> bool {
+        self.never_negative.is_empty() && self.largest.is_empty() && !self.alone
+    }
+
     /// Returns the trial `sizes` for the coefficients with the indices `of`, each limited to the
     /// largest plausible size. `column` is the root mean square of each column.
     fn plausible(&self, sizes: &[f64], of: impl Iterator<Item = usize>, column: f64) -> Vec<f64> {
@@ -371,6 +376,12 @@ fn ln_likelihood_of_columns(
         };
         ln_sign_factor.unwrap_or(0.0) - determinant + grid.ln_likelihood(remaining_squares)
     };
+    averaged(sizes, at)
+}
+
+/// Returns ln of the mean likelihood over ascending `sizes`, and the most probable size. `at`
+/// returns ln of the likelihood at a size.
+pub(super) fn averaged(sizes: &[f64], at: impl Fn(f64) -> f64) -> (f64, f64) {
     // Sizes ascend, and above the most probable one the likelihood falls. The loop therefore ends
     // once larger sizes add nothing to the sum.
     let mut best = (1.0, f64::NEG_INFINITY);

@@ -38,6 +38,7 @@ mod search;
 mod settling;
 mod sites;
 mod waves;
+mod wide_blocks;
 
 use crate::select::settings::{MAX_STAND_INS, max_single_poses};
 use std::collections::BTreeMap;
