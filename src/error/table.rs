@@ -189,6 +189,8 @@ pub enum TableErrorKind {
          u_px = cx + fx u and v_px = cy + fy v, with the distortion applied"
     )]
     NormalisedPixels { largest: String },
+    #[error("{value} px is no place in an image; correct the row, or leave it out")]
+    NoPlaceInImage { value: String },
     #[error(
         "qx, qy, qz, qw are not a rotation, because their squares do not add up to 1; check the \
          columns"
