@@ -62,8 +62,8 @@ pub(super) fn at_limits(problem: &Problem, poses: &Measurements, command: &str) 
     };
     (count > 0).then(|| {
         format!(
-            "{who} a joint at its limit. If the controller refuses such commands, declare limits with a margin ({}, \
-             {}) and {command} again.",
+            "{who} a joint at its limit. If the controller refuses such commands, declare limits \
+             with a margin ({}, {}) and {command} again.",
             code("min_deg"),
             code("max_deg")
         )

@@ -124,8 +124,8 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
         let [other_mean, other_max] =
             [identified.mean.norm, identified.max.norm].map(|of| mm(of, 4));
         Block::Text(format!(
-            "In random poses within the joint limits (and --workspace-mm, if given), {}, the whole model \
-             differs from the exported geometry by {mean} mm on average ({max} mm at most), from \
+            "In random poses within the joint limits (and --workspace-mm, if given), {}, the whole \
+             model differs from the exported geometry by {mean} mm on average ({max} mm at most), from \
              the identified geometry by {other_mean} mm ({other_max} mm at most).",
             if remarks.payload > 0.0 {
                 format!("with payloads up to {} kg", number(remarks.payload, 2))

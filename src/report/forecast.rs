@@ -27,7 +27,8 @@ pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Ve
     (cells, unit.symbol)
 }
 
-/// Explains the dash of a missing standard error below a table of parameters; `None` if all have one.
+/// Explains the dash of a missing standard error below a table of parameters; `None` if all have
+/// one.
 pub(super) fn undetermined_note(expected: &[ExpectedParameter]) -> Option<&'static str> {
     let is_open = |expected: &ExpectedParameter| expected.std_error.is_none();
     expected

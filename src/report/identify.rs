@@ -426,7 +426,8 @@ pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     };
     let words = format!(
         "Active limits and their cost: decrease of the rms residual if the limit is moved outwards \
-         a little,\nby its slope at the limit (standard errors hold with these limits kept{except}):"
+         a little,\nby its slope at the limit (standard errors hold with these limits \
+         kept{except}):"
     );
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }

@@ -134,8 +134,8 @@ fn worse_than_random(plan: &Plan) -> String {
              larger ({ratio:.2} times)."
         ),
         Some((ratio, name)) => format!(
-            " {count} of all {of} have standard errors that are more than {MIN_GROWTH} times larger, \
-             the most {name} ({ratio:.1} times)."
+            " {count} of all {of} have standard errors that are more than {MIN_GROWTH} times \
+             larger, the most {name} ({ratio:.1} times)."
         ),
         None => String::new(),
     }

@@ -1,5 +1,5 @@
-//! Comparison of the prior, an earlier estimate or that of a fleet, with new rows and the posterior,
-//! in words.
+//! Comparison of the prior, an earlier estimate or that of a fleet, with new rows and the
+//! posterior, in words.
 
 use std::fmt::Write as _;
 
@@ -47,9 +47,10 @@ fn draw(comparison: &PriorComparison) -> Option<Drawing> {
     };
     Forest {
         names: ("earlier-estimate", "New rows and posterior against the prior"),
-        caption: "Values ± 1 σ of each parameter that the new rows inform on, in units of the σ of the prior, \
-                  which is at 0 ± 1."
-            .to_owned(),
+        caption:
+            "Values ± 1 σ of each parameter that the new rows inform on, in units of the σ of \
+                  the prior, which is at 0 ± 1."
+                .to_owned(),
         label: "deviation from the prior [its σ]",
         legend: vec![("new rows", INK), ("posterior", ACCENT)],
         references: vec![0.0, -1.0, 1.0],

@@ -337,8 +337,8 @@ pub(super) fn bound_sentence(
             ""
         };
         format!(
-            "Expected error at the targets{of}, measurement noise included: {} mm rms with the commands \
-             of the table, {} mm rms with the corrected ones.{hardly}",
+            "Expected error at the targets{of}, measurement noise included: {} mm rms with the \
+             commands of the table, {} mm rms with the corrected ones.{hardly}",
             shown(uncorrected),
             shown(expected(main))
         )
@@ -377,8 +377,8 @@ pub(super) fn contradiction(compared: Compared) -> Option<String> {
     let rms = (squares.sum::<f64>() / compared.errors.len() as f64).sqrt();
     Some(format!(
         "The rows contradict the estimate: {} mm rms, {} mm expected, {} of {} configurations \
-         within their bounds. This arm has changed, it is another one, or its table is read otherwise \
-         (units, signs).",
+         within their bounds. This arm has changed, it is another one, or the table is \
+         misread (units, signs).",
         number(rms * 1e3, 3),
         number(compared.bounds.expected() * 1e3, 3),
         test.within,

@@ -10,8 +10,8 @@ pub(super) fn failed(tests: &ResidualTests) -> Vec<String> {
     tests.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
-/// States why the tests have another χ²/ν than the fit; `None` if both agree in the shown digits, or
-/// if no reason is known.
+/// States why the tests have another χ²/ν than the fit; `None` if both agree in the shown digits,
+/// or if no reason is known.
 pub(super) fn other_reduced_chi2(
     tests: &ResidualTests,
     fit: &Identification,

@@ -125,7 +125,8 @@ fn draw_errors(cells: &[TimedCell]) -> Option<Drawing> {
         Some((name(cell), vec![Some((rms, cell.held_out_mm.rms_sd.unwrap_or_default()))]))
     };
     let caption = "Root mean square error at held-out poses, noise included, with the standard deviation over the fits of the \
-                   cell. A cell is one combination of noise level (1 σ), number of poses, strategy and solver.";
+                   cell. A cell is one combination of noise level (1 σ), number of poses, strategy \
+                   and solver.";
     Forest {
         names: ("study-errors", "Held-out error of each cell"),
         caption: caption.to_owned(),

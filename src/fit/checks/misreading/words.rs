@@ -15,8 +15,8 @@ use crate::problem::{Fixture, JointKind, Problem};
 /// Number of words beyond which a text names no third misreading.
 const MAX_NAMED_WORDS: usize = 30;
 
-/// Joins descriptions of misreadings, the best first: two, and up to [`MAX_NAMED`] short ones. States
-/// how many others there are.
+/// Joins descriptions of misreadings, the best first: two, and up to [`MAX_NAMED`] short ones.
+/// States how many others there are.
 pub(in crate::fit) fn first_of(words: &[String]) -> String {
     let length = |count: usize| words[..count].join(" ").split(' ').count();
     let is_short = |count: &usize| *count <= 2 || length(*count) <= MAX_NAMED_WORDS;
