@@ -34,7 +34,7 @@ pub(super) fn undetermined_note(expected: &[ExpectedParameter]) -> Option<&'stat
     expected
         .iter()
         .any(is_open)
-        .then_some("–: no standard error, because the poses do not determine the parameter at all")
+        .then_some("– for a standard error: the poses do not determine the parameter at all")
 }
 
 /// States the assumptions of a forecast: that all of `fitted` poses are fitted, and that the target
