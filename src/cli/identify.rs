@@ -76,7 +76,7 @@ fn solvers() -> Vec<(&'static str, &'static str, SolverChoice)> {
 
 /// Prints a warning if few new rows are fitted with a prior and some of them are held out.
 fn warn_of_held_out(problem: &Problem, data: &Dataset) {
-    let poses = data.measurements.pose_numbers(problem);
+    let poses = data.measurements.arm_pose_numbers(problem);
     let held_out: BTreeSet<usize> =
         data.split.held_out.iter().filter_map(|&row| poses.get(row).copied()).collect();
     let argument = advice::held_out_argument(problem.data.held_out.as_ref(), &poses);

@@ -107,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             let accuracy = PredictionAccuracy::new(&closure.after, &shown);
             report::loop_brief(&problem, &closure, accuracy)
         };
-        let poses = data.measurements.pose_numbers(&problem);
+        let poses = data.measurements.arm_pose_numbers(&problem);
         let mut fitted: Vec<usize> =
             data.split.identification.iter().filter_map(|&row| poses.get(row).copied()).collect();
         fitted.sort_unstable();

@@ -1,6 +1,7 @@
 //! Arguments and work of `flexcal next`.
 
 use std::error::Error;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -251,7 +252,7 @@ fn next_step(
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
     // The new rows of an update are too few for a search.
-    let lacks = if asked.prior.is_some() || asked.purpose == Purpose::Causes {
+    let mut lacks = if asked.prior.is_some() || asked.purpose == Purpose::Causes {
         String::new()
     } else if next.has_large_misfit() && !noise_exceeds {
         let closed = results.path("problem.closed.toml");
@@ -267,12 +268,16 @@ fn next_step(
             "flexcal loop {arguments} looks for what the model lacks, because the misfit exceeds \
              the noise; or "
         )
-    } else if next.is_out_of_reach(tolerance) && !next.poses.is_empty() {
-        "choose another --tolerance-mm or a better instrument; to lower the error all the same, "
-            .to_owned()
     } else {
         String::new()
     };
+    if next.is_out_of_reach(tolerance) && !next.poses.is_empty() {
+        let instrument = if lacks.is_empty() { " or a better instrument" } else { "" };
+        let _ = write!(
+            lacks,
+            "choose another --tolerance-mm{instrument}; to lower the error all the same, "
+        );
+    }
     if next.poses.is_empty() {
         return format!("{lacks}flexcal identify {arguments}{prior} writes the estimate to apply");
     }

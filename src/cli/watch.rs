@@ -115,7 +115,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.print_result(&json, || {
         let file = shell_word(&arguments.estimate);
         let first = watch.causes.first().map(|cause| cause.kind);
-        let held_out = advice::held_out_argument(held_out.as_ref(), &rows.pose_numbers(&problem));
+        let poses = rows.arm_pose_numbers(&problem);
+        let held_out = advice::held_out_argument(held_out.as_ref(), &poses);
         let update = || {
             format!(
                 "flexcal identify {} --prior {file}{}{held_out} --out {}",

@@ -85,7 +85,7 @@ pub struct Check {
     pub coordinates: usize,
     /// Number of coordinates that the checked poses measure, counting each distinct pose once.
     pub distinct_coordinates: usize,
-    /// Number of checked poses that differ from one another.
+    /// Number of different poses of the arm in the checked rows.
     pub distinct_poses: usize,
     /// Noun for a checked row: "point" if rows are points in images, else "pose".
     pub(crate) row_noun: &'static str,
@@ -184,7 +184,7 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
         } else {
             "pose"
         },
-        distinct_poses: count_distinct(&poses.pose_numbers(problem), 0..count),
+        distinct_poses: count_distinct(&poses.arm_pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
         open_scale: {
             let names: Vec<&str> = parameters.iter().map(|parameter| &*parameter.name).collect();

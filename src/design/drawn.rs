@@ -21,7 +21,8 @@ pub enum Candidates {
     Rows(Box<Measurements>),
 }
 
-/// Candidates of a plan as two tables, with the site at which they are measured.
+/// Candidates of a plan: uniform poses or the rows given, and, if there are ranges, poses at their
+/// limits; with the site at which they are measured.
 pub(super) struct Drawn<'a> {
     pub site: Site<'a>,
     /// Candidates: the rows of a given table, or poses that are uniform within their ranges.

@@ -32,6 +32,8 @@ pub(super) struct Greedy<'a> {
 
 impl<'a> Greedy<'a> {
     /// Starts from the information before any candidate is measured; `None` if it is singular.
+    /// `candidates` holds the Jᵀ, with `coordinates` columns for each, and `goal` the weights M of
+    /// tr(C M).
     pub fn new(
         (candidates, coordinates): (&'a DMatrix<f64>, usize),
         goal: &'a DMatrix<f64>,

@@ -169,7 +169,10 @@ impl Reporter<'_> {
     /// Returns the root mean square error of the rows of the leading kind that noise, the known
     /// misfit and the uncertainty of the estimate without drift give \[m\] or \[rad\].
     pub fn expected_error(&self) -> f64 {
-        let known = self.known_factor();
+        let mut known = self.known_factor();
+        // Effects of temperature that the estimate lacks are possible, but not expected.
+        let of_warmth = self.causes.iter().filter(|cause| cause.kind == CauseKind::Temperature);
+        of_warmth.flat_map(|cause| &cause.columns).for_each(|&k| known.row_mut(k).fill(0.0));
         self.rms(|row| self.rows.expected_errors(row, &known))
     }
 

@@ -32,8 +32,8 @@ pub(super) const MAX_RELATIVE_CHANGE: f64 = 1e-13;
 /// Largest change of Λ in its last pass, relative to its size, that is still accepted. Rounding may
 /// prevent a smaller one, and the derivatives do not change.
 pub(super) const MAX_ACCEPTED_CHANGE: f64 = 1e-9;
-/// Rounding of a moment relative to the sum of the magnitudes of its terms, which cancel if a hoist
-/// balances the arm.
+/// Largest change of a moment between passes, relative to the sum of the magnitudes of its terms,
+/// that counts as rounding and ends the iteration. The terms cancel if a hoist balances the arm.
 const MOMENT_ROUNDING: f64 = 1e-15;
 /// Reason why a pose has no static equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -21,7 +21,8 @@ const HALVINGS: usize = 40;
 pub struct Bounds {
     /// Probability with which a bound holds, 0 to 1.
     pub level: f64,
-    /// Correction and uncertainty of the prediction in each pose.
+    /// Correction and uncertainty of the prediction in each pose. Covariances are scaled by the
+    /// errors of left-out configurations, as bounds are.
     pub poses: Vec<CorrectedPose>,
     /// Upper bound of the error length in each pose \[m\].
     lengths: Vec<f64>,
@@ -91,11 +92,12 @@ impl BoundTest {
 
 impl Bounds {
     /// Creates the bounds at probability `level` for poses that `correction` corrected.
-    pub fn new(correction: &Correction, poses: Vec<CorrectedPose>, level: f64) -> Self {
+    pub fn new(correction: &Correction, mut poses: Vec<CorrectedPose>, level: f64) -> Self {
         let scores = &correction.scores;
         let factor = scores.quantile(level);
         let lengths = poses.iter().map(|pose| factor * pose.size).collect();
         let scale = scores.scale().unwrap_or(1.0);
+        poses.iter_mut().for_each(|pose| pose.covariance *= scale * scale);
         Self { level, poses, lengths, scale, learned_from: scores.configurations }
     }
 

@@ -81,8 +81,8 @@ pub(super) fn left_out_errors(
     alone.iter().zip(with).enumerate().map(score).collect()
 }
 
-/// Returns the expected root mean square error length \[m\]. `variance` is the trace of the error
-/// covariance \[m²\], and `missed` the length of the part of the correction that is not applied
+/// Returns the expected root mean square of the error length \[m\]. `variance` is the trace of the
+/// error covariance \[m²\], and `missed` the length of the part of the correction that is not applied
 /// \[m\].
 pub(super) fn expected_size(variance: f64, missed: f64) -> f64 {
     (variance + missed * missed).sqrt()

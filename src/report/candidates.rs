@@ -55,11 +55,15 @@ pub(super) fn at_limits(problem: &Problem, poses: &Measurements, command: &str) 
         })
     };
     let count = (0..poses.len()).filter(is_at_limit).count();
-    let have = if count == 1 { "has" } else { "have" };
+    let who = match count {
+        1 => "1 of the poses has".to_owned(),
+        _ if count == poses.len() => format!("All {count} poses have"),
+        _ => format!("{count} of the poses have"),
+    };
     (count > 0).then(|| {
         format!(
-            "{count} of the poses {have} a joint at its limit. If the controller refuses such commands, declare limits with a margin ({}, \
-             {}) and {command} again.",
+            "{who} a joint at its limit. If the controller refuses such commands, declare limits \
+             with a margin ({}, {}) and {command} again.",
             code("min_deg"),
             code("max_deg")
         )

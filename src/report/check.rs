@@ -3,7 +3,7 @@
 use super::detection;
 use super::document::{Block, Column, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, FAINT, INK, Series};
-use super::forecast::{assumptions, cells, poses_to_measure};
+use super::forecast::{assumptions, cells, poses_to_measure, undetermined_note};
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::Story;
 use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
@@ -34,6 +34,7 @@ pub fn check(problem: &Problem, check: &Check) -> Story {
              others (below), the second over arms drawn from the priors",
         );
     }
+    notes.extend(undetermined_note(&forecast.expected));
     let sheet = rows_of_sheet(problem);
     notes.extend(sheet.as_deref());
     let noun = check.row_noun;
@@ -139,8 +140,10 @@ pub fn why_not_sufficient(check: &Check) -> String {
         );
     }
     format!(
-        "{different} of the {of} poses differ and measure {} coordinates, fewer than the {parameters} parameters without \
-         a prior: more poses are needed",
+        "the {of} {}s ({}) measure {} different coordinates, fewer than the {parameters} \
+         parameters without a prior: more poses are needed",
+        check.row_noun,
+        counted(different, "different pose"),
         check.distinct_coordinates
     )
 }

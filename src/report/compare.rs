@@ -120,7 +120,7 @@ fn grouped_strategies(comparison: &Comparison, is_timed: bool) -> Table {
             strategies.iter().map(|(name, solvers)| format!("{name} ({})", solvers.join(", ")));
         let unit = fit.errors.judged().norms().1;
         table.notes.push(format!(
-            "equal to {}, {} within 0.0001 {unit}: {}",
+            "within 0.0001 {unit} of {} ({}): {}",
             fit.strategy,
             fit.solver,
             words.collect::<Vec<_>>().join("; ")

@@ -287,13 +287,13 @@ fn verdict(
     );
     let together = joint.map_or_else(String::new, |(chi2, freedom, p)| {
         let chi2 = number(chi2, 1);
-        format!(" (χ² {chi2} of {freedom}, p {})", p_value(p))
+        format!(" (χ² = {chi2} with {freedom} degrees of freedom, p {})", p_value(p))
     });
     let differ_together = joint.is_some_and(|(.., p)| p < FALSE_ALARM_PROBABILITY);
     match beyond {
         0 if differ_together => format!(
-            "They differ: no single parameter by more than its error allows ({most}; {test}), but \
-             combinations of them{together}."
+            "They differ in combinations of parameters{together}, though in no single one by more \
+             than its error allows ({most}; {test})."
         ),
         0 if shared > 0 => format!(
             "No difference is shown, of single parameters ({most}; {test}) or of all of the arm \

@@ -124,8 +124,8 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
         let [other_mean, other_max] =
             [identified.mean.norm, identified.max.norm].map(|of| mm(of, 4));
         Block::Text(format!(
-            "In random poses within the joint limits (and --workspace-mm), {}, the whole model \
-             differs from the exported geometry by {mean} mm on average ({max} mm at most), from \
+            "In random poses within the joint limits (and --workspace-mm, if given), {}, the whole \
+             model differs from the exported geometry by {mean} mm on average ({max} mm at most), from \
              the identified geometry by {other_mean} mm ({other_max} mm at most).",
             if remarks.payload > 0.0 {
                 format!("with payloads up to {} kg", number(remarks.payload, 2))
@@ -147,9 +147,10 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
         };
         let changed =
             origins.iter().filter(|of| of.moved_mm != 0.0 || of.turned_deg != 0.0).count();
+        let change = if changed == 1 { "changes" } else { "change" };
         blocks.push(Block::lines(format!(
-            "{changed} of {} change:",
-            counted(origins.len(), "joint origin")
+            "{} {change}, and all others stay:",
+            counted(changed, "joint origin")
         )));
         let header = ["origin of", "moved, mm", "turned, °"];
         blocks.push(Block::Table(Table::new(&header, origins.iter().map(row).collect(), &[0])));

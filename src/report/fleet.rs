@@ -6,7 +6,7 @@ use super::document::{Block, Table, last_parts};
 use super::figures::{ACCENT, Drawing, FAINT, Forest, INK, WARM};
 use super::render::Story;
 use crate::life::{Fleet, FleetArm, FleetParameter};
-use crate::quantity::format::{counted, number, or_dash, two_digits};
+use crate::quantity::format::{counted, decimals, number, or_dash, two_digits};
 
 /// Header of the table of parameters.
 const PARAMETER_HEADER: [&str; 5] = ["parameter", "mean", "± 1 σ", "spread", "data sheet"];
@@ -20,10 +20,9 @@ const MAX_DECIMALS: usize = 5;
 /// Returns the fleet, with its arms and parameters drawn.
 pub(crate) fn fleet(fleet: &Fleet) -> Story {
     let unlike = fleet.arms.iter().filter(|arm| arm.is_unlike).count();
+    let is_judged = fleet.arms.len() >= MIN_JUDGED_ARMS;
     let verdict = match unlike {
-        0 if fleet.arms.len() < MIN_JUDGED_ARMS => {
-            "too few to tell whether one is unlike the others".to_owned()
-        }
+        0 if !is_judged => "too few to tell whether one is unlike the others".to_owned(),
         0 => "no arm is unlike the others".to_owned(),
         count => format!("{} unlike the others", counted(count, "arm")),
     };
@@ -33,21 +32,22 @@ pub(crate) fn fleet(fleet: &Fleet) -> Story {
         let _ = write!(head, "\nLeft out, without a variance in some estimate: {names}");
     }
     let parameters = fleet.parameters.iter().map(parameter).collect();
-    let arms = fleet.arms.iter().map(arm).collect();
-    let notes =
-        ["deviations from nominal; spread: 1 σ of the next arm about the mean; data sheet: \
-         declared 1 σ"];
+    let arms = fleet.arms.iter().map(|of| arm(of, is_judged)).collect();
+    let note = "deviations from nominal; ± 1 σ: of the mean; spread: 1 σ of the next arm about the \
+                mean, with few arms between what they show and the data sheet; data sheet: \
+                declared 1 σ";
     let blocks = vec![
         Block::lines(head),
-        Block::figures([draw_arms(fleet), draw_parameters(fleet)]),
-        Block::Table(Table::new(&PARAMETER_HEADER, parameters, &[0]).noted(&notes)),
+        Block::figures([draw_arms(fleet, is_judged), draw_parameters(fleet)]),
+        Block::Table(Table::new(&PARAMETER_HEADER, parameters, &[0]).noted(&[note])),
         Block::Table(Table::new(&ARM_HEADER, arms, &[0, 1, 2])),
     ];
     Story::new(&fleet.problem, "fleet", blocks)
 }
 
-/// Draws the largest deviation of each arm from the other arms.
-fn draw_arms(fleet: &Fleet) -> Option<Drawing> {
+/// Draws the largest deviation of each arm from the other arms. `is_judged` is true if there are
+/// enough arms to call one like the others.
+fn draw_arms(fleet: &Fleet, is_judged: bool) -> Option<Drawing> {
     let row = |arm: &FleetArm| {
         let (parameter, sigmas) = arm.most.as_ref()?;
         let value = Some((*sigmas, 0.0));
@@ -60,7 +60,7 @@ fn draw_arms(fleet: &Fleet) -> Option<Drawing> {
                   difference."
             .to_owned(),
         label: "deviation [standard deviations]",
-        legend: vec![("like its siblings", INK), ("unlike", WARM)],
+        legend: vec![(if is_judged { "like its siblings" } else { "arm" }, INK), ("unlike", WARM)],
         references: vec![0.0],
         rows: fleet.arms.iter().filter_map(row).collect(),
     }
@@ -97,18 +97,23 @@ fn parameter(parameter: &FleetParameter) -> Vec<String> {
     let show = |value: f64| two_digits(value * factor, MAX_DECIMALS);
     vec![
         format!("{} [{symbol}]", parameter.name),
-        number(parameter.mean * factor, 4),
+        number(parameter.mean * factor, decimals(parameter.mean_error * factor, MAX_DECIMALS)),
         show(parameter.mean_error),
         show(parameter.spread),
         or_dash(parameter.declared, show),
     ]
 }
 
-fn arm(arm: &FleetArm) -> Vec<String> {
+fn arm(arm: &FleetArm, is_judged: bool) -> Vec<String> {
     let most = arm.most.as_ref();
     vec![
         arm.file.display().to_string(),
-        if arm.is_unlike { "unlike" } else { "like" }.to_owned(),
+        match (arm.is_unlike, is_judged) {
+            (true, _) => "unlike",
+            (false, true) => "like",
+            (false, false) => "–",
+        }
+        .to_owned(),
         or_dash(most, |most| most.0.clone()),
         or_dash(most, |most| number(most.1, 1)),
     ]

@@ -27,6 +27,16 @@ pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Ve
     (cells, unit.symbol)
 }
 
+/// Explains the dash of a missing standard error below a table of parameters; `None` if all have
+/// one.
+pub(super) fn undetermined_note(expected: &[ExpectedParameter]) -> Option<&'static str> {
+    let is_open = |expected: &ExpectedParameter| expected.std_error.is_none();
+    expected
+        .iter()
+        .any(is_open)
+        .then_some("– for a standard error: the poses do not determine the parameter at all")
+}
+
 /// States the assumptions of a forecast: that all of `fitted` poses are fitted, and that the target
 /// is at its default place. `None` if neither needs saying.
 pub(super) fn assumptions<'a>(

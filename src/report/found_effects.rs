@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Column, Point, Table, percent, split_at_most};
+use super::document::{Block, Column, Point, Table, code, percent, split_at_most};
 use super::errors::with_unit_of;
 use super::verdict::{alternative, has_place, stand_in_sentence, title};
 use super::{effect, figures, trace};
@@ -124,12 +124,19 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
     }
     let change = |(round, _): &(usize, &Step)| {
         let (added, removed) = closure.changes_of_round(round - 1);
-        let listed = |word: &str, effects: Vec<&Effect>| {
-            let words: Vec<String> =
-                effects.into_iter().map(|effect| closure.before.describe(effect)).collect();
+        // The words leave out arguments that a search refines, such as a period.
+        let words = |effect: &&Effect| closure.before.describe(effect);
+        let named = |effect: &&Effect, others: &[&Effect]| match words(effect) {
+            alike if others.iter().any(|other| words(other) == alike) => {
+                format!("{alike} ({})", code(&effect.declaration()))
+            }
+            alone => alone,
+        };
+        let listed = |word: &str, effects: &[&Effect], others: &[&Effect]| {
+            let words: Vec<String> = effects.iter().map(|effect| named(effect, others)).collect();
             (!words.is_empty()).then(|| format!("{word}: {}", words.join("; ")))
         };
-        let parts = [listed("added", added), listed("removed", removed)];
+        let parts = [listed("added", &added, &removed), listed("removed", &removed, &added)];
         let words = parts.into_iter().flatten().collect::<Vec<_>>().join(" – ");
         if words.is_empty() { "no change".to_owned() } else { words }
     };

@@ -419,9 +419,16 @@ pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     let bounds = found.estimates.iter().filter_map(bound);
     let points: Vec<String> =
         bounds.chain(found.active_constraints.iter().map(constraint)).collect();
-    let words = "Active limits and their cost: decrease of the rms residual if the limit is moved outwards \
-                 a little,\nby its slope at the limit (standard errors hold with these limits kept):"
-        .to_owned();
+    let except = if found.has(FindingCode::BoundInUnidentifiedDirection) {
+        ", except those that a warning names"
+    } else {
+        ""
+    };
+    let words = format!(
+        "Active limits and their cost: decrease of the rms residual if the limit is moved outwards \
+         a little,\nby its slope at the limit (standard errors hold with these limits \
+         kept{except}):"
+    );
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }
 

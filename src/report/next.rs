@@ -175,9 +175,14 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     if options.purpose == Purpose::Causes {
         let gain: f64 = next.steps.iter().map(|step| step.gain).sum();
         let poses = counted(next.steps.len(), "pose");
+        let variance = if next.effects.len() == 1 {
+            "variance of the effect listed below falls"
+        } else {
+            "mean variance of the effects listed below falls"
+        };
         return format!(
-            "These {poses} lower the mean variance of the effects below by {} %; flexcal loop with \
-             them says which effect acts.",
+            "With these {poses} the {variance} by {} %. Run flexcal loop with them to see whether \
+             they decide.",
             number(100.0 * gain, 0)
         );
     }

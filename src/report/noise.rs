@@ -6,7 +6,7 @@ use std::path::Path;
 use super::document::{Block, first_of, joined};
 use super::errors::{brief, row_noun, test_rows_word, unit, with_unit};
 use super::prior::contradiction;
-use super::remainder::{HELD_OUT, PredictionAccuracy};
+use super::remainder::{HELD_OUT, PredictionAccuracy, exceed};
 use crate::fit::{FindingCode, Identification, Noise, Outlier, TypicalScatter, size_of_kind};
 use crate::problem::{Observation, Problem};
 use crate::quantity::format::{counted, decimals, mm, number};
@@ -70,18 +70,23 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
             format!("Reduced χ² (χ²/ν) is {}: {explained}.", number(chi2, 2))
         }
         ResidualSize::Unclear(chi2) => {
-            let (size, what) =
-                if chi2 > 1.0 { ("larger", "explains") } else { ("smaller", "predicts") };
+            let (size, what, are) = if chi2 > 1.0 {
+                ("larger", "explains", "small")
+            } else {
+                ("smaller", "predicts", "large")
+            };
+            let reason = if !found.is_trusted() {
+                "because another σ would not mend what the warnings name".to_owned()
+            } else if found.prior.is_some() {
+                format!("which a fit with a prior does not change: they are too {are}")
+            } else {
+                "because no other σ is clearly more probable".to_owned()
+            };
             format!(
                 "Reduced χ² (χ²/ν) is {}; {}: the residual is {size} than the declared σ {what}.\n\
-                 Standard errors assume the declared σ, because {}.",
+                 Standard errors assume the declared σ, {reason}.",
                 format_chi2(chi2),
                 expected_interval(found),
-                if found.is_trusted() {
-                    "the data do not clearly contradict it"
-                } else {
-                    "another σ would not mend what the warnings name"
-                }
             )
         }
     }
@@ -324,7 +329,7 @@ pub(super) fn reservations(
     let test = accuracy.and_then(|accuracy| accuracy.contradicted);
     let exceeding = test.map(|test| {
         let (beyond, of) = (test.beyond(), test.of);
-        format!("{beyond} of {of} {HELD_OUT} exceed their error bound, beyond chance")
+        format!("{beyond} of {of} {HELD_OUT} {}, beyond chance", exceed(beyond))
     });
     let farther = found.has(FindingCode::HeldOutBeyondPrediction).then(|| {
         "held-out rows are farther from the prediction than the fit expects, beyond chance"
@@ -429,8 +434,10 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         "" => format!("Trusted{scope}"),
         _ => CONVERGED.to_owned(),
     });
+    // The change of the error is the ground of trust, but of no reservation.
+    let the = if reserved.is_empty() { ": the" } else { ". The" };
     format!(
-        "{judged}{reserved}: the mean {} error {change}{without}.{}",
+        "{judged}{reserved}{the} mean {} error {change}{without}.{}",
         test_rows_word(&found.fitted).replace(' ', "-"),
         if is_larger {
             format!(" Not fully explained: the residual{of} is {size}.")

@@ -4,7 +4,9 @@
 use super::candidates::{at_limits, candidates_drawn};
 use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Drawing, Forest};
-use super::forecast::{assumptions, cells, separation_blocks, separation_sentence};
+use super::forecast::{
+    assumptions, cells, separation_blocks, separation_sentence, undetermined_note,
+};
 use super::next::command_table;
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::Story;
@@ -76,7 +78,7 @@ pub fn plan(
         let (factor, than) = if gain < 1.0 { (1.0 / gain, "LARGER") } else { (gain, "smaller") };
         Block::Text(format!(
             "These poses make the standard errors {factor:.2} times {than} than random poses do (geometric mean of the {} parameters \
-             of the arm that random poses identify well){}.",
+             of the arm that random poses identify well).{}",
             meaningful.len(),
             worse_than_random(plan)
         ))
@@ -95,7 +97,8 @@ pub fn plan(
     blocks.push(sufficiency(plan));
     blocks.extend(gain);
     blocks.extend(at_limits(problem, &plan.poses, "plan").map(Block::Text));
-    let notes: Vec<String> = [note].into_iter().chain(rows_of_sheet(problem)).collect();
+    let undetermined = undetermined_note(&planned.expected).map(str::to_owned);
+    let notes = [Some(note), undetermined, rows_of_sheet(problem)].into_iter().flatten().collect();
     blocks.push(Block::Table(Table { notes, ..Table::new(&header, rows.collect(), &[0, 6]) }));
     blocks.push(Block::figures([draw_gains(plan)]));
     blocks.push(Block::Page(vec![conditioning(
@@ -124,13 +127,16 @@ fn worse_than_random(plan: &Plan) -> String {
         (ratio > MIN_GROWTH && ratio.is_finite()).then_some((ratio, &expected.name))
     });
     let grown: Vec<(f64, &String)> = grown.collect();
-    match grown.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((ratio, name)) => {
-            format!(
-                "; larger for {}, most for {name} ({ratio:.1} times)",
-                counted(grown.len(), "parameter")
-            )
-        }
+    let (count, of) = (grown.len(), counted(plan.planned.expected.len(), "parameter"));
+    match grown.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((ratio, name)) if count == 1 => format!(
+            " Of all {of}, {name} alone has a standard error that is more than {MIN_GROWTH} times \
+             larger ({ratio:.2} times)."
+        ),
+        Some((ratio, name)) => format!(
+            " {count} of all {of} have standard errors that are more than {MIN_GROWTH} times \
+             larger, the most {name} ({ratio:.1} times)."
+        ),
         None => String::new(),
     }
 }

@@ -1,4 +1,5 @@
-//! Comparison of an earlier estimate (the prior) with new rows and the posterior, in words.
+//! Comparison of the prior, an earlier estimate or that of a fleet, with new rows and the
+//! posterior, in words.
 
 use std::fmt::Write as _;
 
@@ -9,25 +10,25 @@ use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash, 
 
 /// Header of the table of parameters.
 const HEADER: [&str; 7] =
-    ["parameter", "earlier", "± 1 σ", "new rows", "± 1 σ", "posterior", "± 1 σ"];
+    ["parameter", "prior", "± 1 σ", "new rows", "± 1 σ", "posterior", "± 1 σ"];
 /// p-value of χ² below which a text does not say that the new rows agree with the prior.
 const MIN_AGREEING_P: f64 = 0.001;
 /// Largest standard error by the new rows, in units of the earlier one, at which the figure shows a
 /// parameter. Above it the new rows add hardly any information.
 const MAX_DRAWN_ERROR: f64 = 10.0;
 
-/// Returns the comparison with the earlier estimate: a summary, a figure and a table of the
-/// parameters that it informs on. Empty without an earlier estimate.
+/// Returns the comparison with the prior: a summary, a figure and a table of the parameters that it
+/// informs on. Empty for a fit without an earlier estimate or a fleet as its prior.
 pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
     let Some(comparison) = &found.prior else { return Vec::new() };
     let rows = comparison.parameters.iter().map(row).collect();
     let note =
-        "new rows: estimate from them and the earlier estimate of the other parameters; –: they add less \
-         than a thousandth to the earlier information, or the parameter is at a bound"
+        "new rows: estimate from them and the prior of the other parameters; –: they add less than \
+         a thousandth to the information of the prior, or the parameter is at a bound"
             .to_owned();
     let table = Table { notes: vec![note], ..Table::new(&HEADER, rows, &[0]) };
     vec![
-        Block::Heading("Earlier estimate as prior".to_owned()),
+        Block::Heading("Prior against the new rows".to_owned()),
         Block::Text(summary(comparison)),
         Block::figures([draw(comparison)]),
         Block::Table(table),
@@ -45,11 +46,12 @@ fn draw(comparison: &PriorComparison) -> Option<Drawing> {
         Some((compared.name.clone(), vec![Some(data), posterior]))
     };
     Forest {
-        names: ("earlier-estimate", "New rows and posterior against the earlier estimate"),
-        caption: "Values ± 1 σ of each parameter that the new rows inform on, in standard errors of the earlier estimate, which is \
-                  at 0 ± 1."
-            .to_owned(),
-        label: "change from the earlier estimate [its σ]",
+        names: ("earlier-estimate", "New rows and posterior against the prior"),
+        caption:
+            "Values ± 1 σ of each parameter that the new rows inform on, in units of the σ of \
+                  the prior, which is at 0 ± 1."
+                .to_owned(),
+        label: "deviation from the prior [its σ]",
         legend: vec![("new rows", INK), ("posterior", ACCENT)],
         references: vec![0.0, -1.0, 1.0],
         rows: comparison.parameters.iter().filter_map(row).collect(),
@@ -71,7 +73,7 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
     if let Some((chi2, coordinates, p)) = comparison.chi2 {
         let _ = write!(
             text,
-            ". New rows against it: χ² {} of {coordinates:.0} coordinates, p {}",
+            ". New rows against it: χ² = {} with {coordinates:.0} degrees of freedom, p {}",
             number(chi2, 1),
             p_value(p)
         );

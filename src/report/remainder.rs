@@ -219,10 +219,11 @@ impl PredictionAccuracy {
             let [rms, max] = [errors.rms.norm, errors.max.norm].map(|of| number(of * 1e3, 2));
             kept = match &uncertainty.test {
                 Some(test) => format!(
-                    " {} of {} {HELD_OUT} exceed theirs ({} by chance); the largest error is \
-                     {max} mm.",
+                    " This bound allows for the misfit too: {} of {} {HELD_OUT} {} ({} by chance); \
+                     the largest error is {max} mm.",
                     test.beyond(),
                     test.of,
+                    exceed(test.beyond()),
                     number(test.expected_beyond(), 1)
                 ),
                 None => format!(" The held-out poses err by {rms} mm rms, {max} mm at most."),
@@ -244,6 +245,11 @@ impl PredictionAccuracy {
     }
 }
 
+/// Returns the words that `count` configurations exceed their bounds.
+pub(super) fn exceed(count: usize) -> &'static str {
+    if count == 1 { "exceeds its own bound" } else { "exceed their own bound" }
+}
+
 /// States how many configurations, which `noun` names, exceed their bounds if chance does not
 /// explain their number; otherwise empty. The sentence begins with a space.
 fn contradicted_bound(test: Option<&BoundTest>, noun: &str) -> String {
@@ -251,8 +257,9 @@ fn contradicted_bound(test: Option<&BoundTest>, noun: &str) -> String {
     let (beyond, of) = (test.beyond(), test.of);
     let expected = number(test.expected_beyond(), 1);
     format!(
-        " But {beyond} of {of} {noun} exceed their own bound, and chance explains {expected}: \
-         predictions at such poses err more than the bound says."
+        " But {beyond} of {of} {noun} {}, and chance explains {expected}: predictions at such \
+         poses err more than the bound says.",
+        exceed(beyond)
     )
 }
 
@@ -313,8 +320,13 @@ pub(super) fn bound_sentence(
     let bound = |poses: &[usize]| shown(rms(poses, &|pose| bounds.bound(pose)));
     let main = if within.is_empty() { &beyond } else { &within };
     let level = percent_of(bounds.level);
+    let of = if beyond.is_empty() || within.is_empty() {
+        ""
+    } else {
+        " within the range of the fitted poses"
+    };
     let mut words = if misses.is_empty() {
-        format!("Expected error {} mm rms, measurement noise included.", shown(expected(main)))
+        format!("Expected error{of}: {} mm rms, measurement noise included.", shown(expected(main)))
     } else {
         let uncorrected = rms(main, &|pose| {
             bounds.expected_at(pose).hypot(misses.get(pose).copied().unwrap_or(0.0))
@@ -325,13 +337,13 @@ pub(super) fn bound_sentence(
             ""
         };
         format!(
-            "Expected error at the targets, measurement noise included: {} mm rms with the commands \
-             of the table, {} mm rms with the corrected ones.{hardly}",
+            "Expected error at the targets{of}, measurement noise included: {} mm rms with the \
+             commands of the table, {} mm rms with the corrected ones.{hardly}",
             shown(uncorrected),
             shown(expected(main))
         )
     };
-    let _ = write!(words, " The {level} % bounds: {} mm, rms over the poses.", bound(main));
+    let _ = write!(words, " The {level} % bounds: {} mm, rms over these poses.", bound(main));
     if let Some(compared) = compared
         && are_predicted(bounds, compared.errors)
     {
@@ -365,7 +377,8 @@ pub(super) fn contradiction(compared: Compared) -> Option<String> {
     let rms = (squares.sum::<f64>() / compared.errors.len() as f64).sqrt();
     Some(format!(
         "The rows contradict the estimate: {} mm rms, {} mm expected, {} of {} configurations \
-         within their bounds. Another arm, or this one has changed.",
+         within their bounds. This arm has changed, it is another one, or the table is \
+         misread (units, signs).",
         number(rms * 1e3, 3),
         number(compared.bounds.expected() * 1e3, 3),
         test.within,

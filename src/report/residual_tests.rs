@@ -10,7 +10,8 @@ pub(super) fn failed(tests: &ResidualTests) -> Vec<String> {
     tests.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
-/// States why the tests have another χ²/ν than the fit; `None` if both agree in the shown digits.
+/// States why the tests have another χ²/ν than the fit; `None` if both agree in the shown digits,
+/// or if no reason is known.
 pub(super) fn other_reduced_chi2(
     tests: &ResidualTests,
     fit: &Identification,
@@ -22,10 +23,21 @@ pub(super) fn other_reduced_chi2(
         .outcome
         .as_ref()
         .ok()?;
-    let words = "χ²/ν of the tests differs from that of the fit, because the tests leave out \
-                 outliers and fit each stiffness by itself.";
-    (number(size.statistic, 2) != number(fit.reduced_chi2?, 2))
-        .then(|| Block::Text(words.to_owned()))
+    let is_elastic = fit.unknowns.iter().any(|name| name.ends_with("stiffness"));
+    let reasons = [
+        (fit.orientation.is_some(), "take positions alone"),
+        (!tests.outliers.is_empty(), "leave out outliers"),
+        (is_elastic, "fit each stiffness by itself"),
+    ];
+    let reasons: Vec<&str> =
+        reasons.iter().filter(|(holds, _)| *holds).map(|(_, reason)| *reason).collect();
+    let differ = number(size.statistic, 2) != number(fit.reduced_chi2?, 2);
+    (differ && !reasons.is_empty()).then(|| {
+        Block::Text(format!(
+            "χ²/ν of the tests differs from that of the fit, because the tests {}.",
+            reasons.join(" and ")
+        ))
+    })
 }
 
 fn point(check: &ResidualTest) -> Point {

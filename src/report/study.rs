@@ -101,7 +101,7 @@ fn conclusion(cells: &[TimedCell]) -> String {
     let is_lost = |(cell, _): &&TimedCell| cell.failure_rate >= 1.0;
     let lost: Vec<String> = cells.iter().filter(is_lost).map(|cell| name(&cell.0)).collect();
     if !lost.is_empty() {
-        let _ = write!(words, ". In these cells no fit is to be trusted: {}", lost.join("; "));
+        let _ = write!(words, ". In these cells no fit is to be trusted: {}.", lost.join("; "));
     }
     words
 }
@@ -125,7 +125,8 @@ fn draw_errors(cells: &[TimedCell]) -> Option<Drawing> {
         Some((name(cell), vec![Some((rms, cell.held_out_mm.rms_sd.unwrap_or_default()))]))
     };
     let caption = "Root mean square error at held-out poses, noise included, with the standard deviation over the fits of the \
-                   cell. A cell is a noise (1 σ), a number of poses, a strategy and a solver.";
+                   cell. A cell is one combination of noise level (1 σ), number of poses, strategy \
+                   and solver.";
     Forest {
         names: ("study-errors", "Held-out error of each cell"),
         caption: caption.to_owned(),

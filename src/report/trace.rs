@@ -257,7 +257,7 @@ pub(super) fn claims_text(claims: &Claims) -> String {
             Some((last, others)) => format!("{} and {last}", others.join(", ")),
             None => String::new(),
         };
-        format!("; depends on {inputs}: {}", percent(depends_on.probability))
+        format!("; depends there on {inputs} alone: {}", percent(depends_on.probability))
     };
     format!("acts {}: {}{inputs}; {words}", at_place(&place.value), percent(place.probability))
 }

@@ -322,8 +322,9 @@ pub(super) fn stand_in_sentence(found: &FoundEffect) -> Option<String> {
         .then(|| format!("the model represents it by: {}", declared(&found.effect)))
 }
 
-/// Returns what is not known about a cause that the model only represents by some effect, and how
-/// sure another effect is that was not found; see [`unknown_part`] and [`doubt`].
+/// Returns two remarks on `found`: what is not known of its cause, if the model only represents it
+/// by some effect ([`unknown_part`]), and how sure the effect is, if its status is not
+/// [`Status::Found`] ([`doubt`]).
 pub(super) fn doubts(found: Option<&FoundEffect>) -> (Option<&'static str>, Option<String>) {
     (found.and_then(unknown_part), found.and_then(doubt))
 }

@@ -67,8 +67,8 @@ pub(crate) fn watch(
     }
     let mut blocks = opening(&problem.title, head).to_vec();
     blocks.push(Block::Page(vec![Block::Text(format!(
-        "σ of a coordinate, known misfit included: {}; χ² {} of {coordinates:.0}, p {}. The covariance also contains the uncertainty of \
-         the estimate and, if the rows state temperatures, effects of temperature as large as the misfit, so a small χ² is usual.",
+        "σ of a coordinate, known misfit included: {}; χ² = {} with {coordinates:.0} degrees of \
+         freedom, p {}. The covariance also contains the uncertainty of the estimate and, if the rows state temperatures, effects of temperature as large as the misfit, so a small χ² is usual.",
         in_unit(watch.sigma),
         number(chi2, 1),
         p_value(p)
@@ -200,7 +200,7 @@ fn verdict(watch: &Watch) -> String {
             format!("most probable of what was tried, but not the whole: {}", cause.label)
         }
         (Some(cause), _) => cause.label.clone(),
-        (None, Some(cause)) => format!("not certain what; first {}", cause.label),
+        (None, Some(cause)) => format!("cause uncertain; most probable: {}", cause.label),
         (None, None) => String::new(),
     };
     format!("Changed, seen after {}: {what}", counted(row, "row"))

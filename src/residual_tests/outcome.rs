@@ -246,16 +246,16 @@ fn write_tested(
         }
         Test::Outliers { worst } => {
             let pose = match (row, worst) {
-                (Some(row), _) => format!("{row} has "),
-                (None, Some(pose)) => format!("pose {} has ", pose + 1),
-                (None, None) => String::new(),
+                (Some(row), _) => row.to_string(),
+                (None, Some(pose)) => format!("pose {}", pose + 1),
+                (None, None) => "one pose".to_owned(),
             };
             let size = if *failed {
-                "an outlier: a gross error, or an effect that acts in few poses"
+                "is an outlier: a gross error, or an effect that acts in few poses"
             } else {
-                "the largest residual, which is not significant"
+                "has the largest residual, which is not significant"
             };
-            write!(f, "{pose}{size} ({statistic:.1} × the scatter, expected up to {to:.1})")
+            write!(f, "{pose} {size} ({statistic:.1} × the scatter, expected up to {to:.1})")
         }
         Test::Normality => {
             let normal = if *failed { "are not" } else { "may be" };
@@ -278,7 +278,7 @@ fn order_phrase(sequence: Sequence) -> &'static str {
 fn untested_phrase(test: &Test) -> String {
     match test {
         Test::ReducedChiSquared => "size of the residual against σ".to_owned(),
-        Test::LackOfFit => "size against repeated poses".to_owned(),
+        Test::LackOfFit => "size of the residual against the scatter of repeated poses".to_owned(),
         Test::Runs { sequence } => format!("signs {}", order_phrase(*sequence)),
         Test::LjungBox { sequence } => format!("autocorrelation {}", order_phrase(*sequence)),
         Test::Dependence { covariate } => format!("dependence on {covariate}"),

@@ -135,7 +135,10 @@ fn a_check_does_not_trust_what_a_fit_would_not() {
     };
     one.write("problem.toml", without_limits(format!("{ARM}{BASE}{DATA}")));
     let run = check(&one).code(1);
-    assert_contains(&run.stderr, &["1 of the 30 poses differ and measure 3 coordinates"]);
+    assert_contains(
+        &run.stderr,
+        &["the 30 poses (1 different pose) measure 3 different coordinates"],
+    );
     // The second joint never moves, but poses within its limits would determine its parameter.
     let free = "[parameters]\n'joint1.theta' = { free = true }\n'joint2.theta' = { free = true }\n'joint3.a' = { free = true }\n";
     let still = |lines: Vec<&str>| {

@@ -132,7 +132,7 @@ fn the_command_writes_a_prior_that_identify_takes() {
     let run = "identify problem.toml --data a-none.csv --prior PRIOR.toml --out with -v";
     assert_contains(
         &folder.flexcal(run).success().stdout,
-        &["Earlier estimate as prior", "PRIOR.toml"],
+        &["Prior against the new rows", "PRIOR.toml"],
     );
     let again = files.replace("a-none", "with");
     let twice = folder.flexcal(&format!("fleet {again} --out TWICE.toml")).code(2);

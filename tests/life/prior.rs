@@ -149,7 +149,7 @@ fn the_command_names_what_differs_and_shows_prior_data_and_posterior() {
     let shown = folder.flexcal(&format!("{run} --drift 2 -v")).success();
     assert_contains(
         &shown.stdout,
-        &["Earlier estimate as prior", "drift of 2 days", "No contradiction is shown"],
+        &["Prior against the new rows", "drift of 2 days", "No contradiction is shown"],
     );
     let json = folder.flexcal(&format!("{run} --json")).json();
     assert_eq!(json["prior"]["rows_left_out"], 0);

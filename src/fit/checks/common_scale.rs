@@ -43,13 +43,12 @@ impl Check for ScaleHolds {
         if !Misfit.check(fit).is_empty() {
             return Vec::new();
         }
-        let CommonFactor { error, score, lengths, determined, .. } = found;
+        let CommonFactor { error, score, lengths, .. } = found;
         let side = if error > 0.0 { "longer" } else { "shorter" };
         let sigmas = score.abs();
         let text = format!(
-            "a common factor of {:.4} explains the fitted lengths of the arm ({lengths} lengths, \
-             of which the measurements determine about {determined:.0}): they are {:.2} % {side} \
-             than declared, {sigmas:.1} σ beyond what their priors allow",
+            "a common factor of {:.4} explains the {lengths} fitted lengths of the arm: they are \
+             {:.2} % {side} than declared, {sigmas:.1} σ beyond what their priors allow",
             1.0 + error,
             100.0 * error.abs()
         );
@@ -134,8 +133,6 @@ struct CommonFactor {
     unexplained: f64,
     /// Number of lengths.
     lengths: usize,
-    /// Number of lengths that the data determine: sum of the shares of each.
-    determined: f64,
 }
 
 impl CommonFactor {
@@ -189,8 +186,7 @@ impl CommonFactor {
         let (error_of_others, of_others) = score_of(&others);
         let others = error_of_others * of_others.max(0.0).sqrt() / scatter;
         let score = error * information.sqrt() / scatter;
-        let determined = determined.trace();
-        Some(Self { error, score, others, unexplained, lengths: n, determined })
+        Some(Self { error, score, others, unexplained, lengths: n })
     }
 
     /// Returns true if the factor is far beyond what the priors allow, more than one length

@@ -207,11 +207,13 @@ fn tool_entry(
         "the tool is turned by 180° about z: correct x and y of the tool or of its fixed joint"
             .to_owned()
     } else {
-        let mistake = mistaken_target(declared, fitted)
-            .map_or_else(String::new, |mistake| format!("{mistake}: correct target_m; otherwise "));
-        format!(
-            "{mistake}enter the target in [tool] if the tool was declared wrongly or not at all; \
-             an error in d of the last joint looks the same"
+        mistaken_target(declared, fitted).map_or_else(
+            || {
+                "enter the target in [tool] if the tool was declared wrongly or not at all; an \
+                 error in d of the last joint looks the same"
+                    .to_owned()
+            },
+            |mistake| format!("{mistake}: correct target_m"),
         )
     };
     ContradictedEntry { words, remedy }

@@ -110,7 +110,7 @@ fn copies(fit: &CheckedFit) -> usize {
 }
 
 /// Maximum number of held-out rows that the text of a finding names.
-const MAX_NAMED_ROWS: usize = 5;
+const MAX_NAMED_ROWS: usize = 3;
 
 /// Checks that at least one held-out row is no copy of an identification row.
 pub(super) struct NotAllCopied;

@@ -5,7 +5,7 @@ use serde_json::json;
 use super::checked_fit::{Check, CheckedFit};
 use super::contradicted_entry::exchanged_targets;
 use super::finding::{Finding, FindingCode};
-use super::misreading::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_NOISE_SIGMAS, misread_masses};
+use super::misreading::{MAX_CLEAR_RATIO, MAX_NOISE_SIGMAS, first_of, misread_masses};
 use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::format_error;
@@ -87,15 +87,13 @@ impl Check for ReadAsMeant {
             );
             return vec![Finding::new(FindingCode::StrategyMisfit, numbers, text)];
         }
-        let words: Vec<&str> =
-            explanations.fitted.iter().map(|explanation| explanation.words.as_str()).collect();
-        let more = words.len().saturating_sub(MAX_NAMED);
-        let more = if more > 0 { format!(", or {more} more") } else { String::new() };
+        let words: Vec<String> =
+            explanations.fitted.iter().map(|explanation| explanation.words.clone()).collect();
         let name = kind.observation.kind();
         let is_noise = kind.declared_sigma.is_none_or(|sigma| {
             best.rms <= MAX_NOISE_SIGMAS * kind.observation.expected_norm() * sigma
         });
-        let named = words[..words.len().min(MAX_NAMED)].join(", or ");
+        let named = first_of(&words);
         let [rest, as_read] =
             [best.rms, explanations.as_read].map(|error| format_error(name, error, 3));
         let numbers = [json!(words), explanations.as_read.into(), best.rms.into()];
@@ -125,7 +123,7 @@ impl Check for ReadAsMeant {
                 )
             };
             let text = format!(
-                "the measurements fit if they are read in another way: with {named}{more}, the rms \
+                "the measurements fit if they are read in another way: with {named}, the rms \
                  error would be {instead}"
             );
             return vec![found(text)];
@@ -134,7 +132,7 @@ impl Check for ReadAsMeant {
         if is_clear {
             let text = format!(
                 "the measurements fit better if they are read in another way: with \
-                 {named}{more}, the rms error would be {rest} (as read {as_read}). That is still \
+                 {named}, the rms error would be {rest} (as read {as_read}). That is still \
                  more than the declared σ: the model lacks something, or another mistake remains"
             );
             return vec![found(text)];
@@ -142,7 +140,7 @@ impl Check for ReadAsMeant {
         // Another cause may leave as much.
         let text = format!(
             "the error of {as_read} has no explanation yet; it would fall to {rest}, which is \
-             still more than the declared σ, with {named}{more}"
+             still more than the declared σ, with {named}"
         );
         let finding = found(text);
         let more = finding.remedy.split_once("; ").map_or("", |(_, more)| more);

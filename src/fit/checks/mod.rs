@@ -47,6 +47,7 @@ use serde_json::Value;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
 use finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, OF_MISFIT};
+use misreading::first_of;
 
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
 /// print the first finding that is an error as the reason.
@@ -172,7 +173,7 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
                 let remedy = if is_shown {
                     text.clone()
                 } else {
-                    format!("{text}; otherwise {}", finding.remedy)
+                    format!("{text}; otherwise {}", finding.code.entry().remedy)
                 };
                 *finding = finding.clone().with_remedy(remedy);
             }
@@ -224,10 +225,13 @@ fn state_limits_first(findings: &mut [Finding]) {
     let text = &findings[limits].text;
     let Some((_, errors)) = text.split_once("; without limits ") else { return };
     if without_limits <= MAX_EQUAL_ERRORS * corrected {
+        let readings = findings[misread].value("explanations").and_then(Value::as_array);
+        let readings = readings.into_iter().flatten().filter_map(Value::as_str);
+        let readings: Vec<String> = readings.map(str::to_owned).collect();
         let text = format!(
-            "limits of the problem cause most of the misfit (another warning names them): without \
-             limits {errors}; or {}",
-            findings[misread].text
+            "limits of the problem cause most of the misfit (another warning lists them): without \
+             limits {errors}; or the input is misread, which leaves no less: {}",
+            first_of(&readings)
         );
         let remedy = "check these limits first, then units, signs, order or convention in the \
                       table or the problem";
@@ -241,11 +245,12 @@ fn state_limits_first(findings: &mut [Finding]) {
 fn state_explanations(findings: &mut [Finding]) {
     let nominal = findings.iter().find(|found| found.code == FindingCode::NominalFarOff);
     let words = nominal.and_then(|found| found.value("explanations")?.as_array());
-    let words: Vec<&str> = words.into_iter().flatten().filter_map(Value::as_str).collect();
+    let words = words.into_iter().flatten().filter_map(Value::as_str);
+    let words: Vec<String> = words.map(str::to_owned).collect();
     if words.is_empty() {
         return;
     }
-    let suspect = format!("check first for {}", words.join(", or "));
+    let suspect = format!("check first for {}", first_of(&words));
     let is_of_misfit = |found: &&mut Finding| FAR_OFF.contains(&found.code);
     for finding in findings.iter_mut().filter(is_of_misfit) {
         let remedy = format!(

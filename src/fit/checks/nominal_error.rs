@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::misreading::{Explanations, Misreading, is_of_views};
+use super::misreading::{Explanations, Misreading, first_of, is_of_views};
 use super::row_kind::{RowKind, format_error, quantity_noun, suspects};
 use crate::model::parameter::{Parameter, ParameterSite};
 
@@ -157,7 +157,7 @@ fn far_off_finding(
             } else {
                 format!("reduce it to {}", format_error(kind, left, 1))
             };
-            finding.with_remedy(format!("this would {effect}: {}", words.join(", or ")))
+            finding.with_remedy(format!("this would {effect}: {}", first_of(&words)))
         }
         true if kind == "position" && !is_base_free => finding.with_remedy(
             "free the base in [parameters]: \"base.*\" = { free = true }; or check units and signs of \

@@ -306,6 +306,8 @@ fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String
     lenses.dedup();
     for camera in lenses {
         let part = |name: &str| set_up(name) || is_lens(name) && group(name) == camera;
+        let is_focal = |name: &str| is_lens(name) && ["fx", "fy"].contains(&field(name));
+        add(Open::Apart, found.within(|k| named(k, &part) && !is_focal(names[k])));
         add(Open::Focal, found.within(|k| named(k, &part)));
     }
     let scale = found.within(|k| named(k, &is_length));
@@ -410,6 +412,8 @@ mod tests {
             "camera[eye].fx",
             "marker[board].x",
             "marker[board].z",
+            "camera[eye].k2",
+            "camera[eye].k3",
         ];
         let row = |weights: &[(usize, f64)]| {
             let mut row = RowDVector::zeros(names.len());
@@ -429,6 +433,7 @@ mod tests {
         let place = row(&[(3, 1.0), (7, -1.0)]);
         let last = row(&[(2, 1.0), (5, -1.0)]);
         let focal = row(&[(6, 1.0), (5, 0.2), (8, -0.5)]);
+        let lens = row(&[(9, 1.0), (10, -0.6)]);
         let scale = row(&[(0, 0.4), (1, 0.6), (2, 0.1), (5, 0.2), (7, 0.3), (8, 0.9)]);
         let expected = |word: &'static str, names: &str| (word, names.to_owned());
         assert_eq!(open(std::slice::from_ref(&unseen)), [expected("unseen", "tool.x")]);
@@ -438,13 +443,15 @@ mod tests {
                 unseen.clone() + &place,
                 &place - &last,
                 last.clone(),
-                focal + &last,
+                focal + &last + &lens,
+                lens,
                 scale + place.clone()
             ]),
             [
                 expected("unseen", "tool.x"),
                 expected("place", "base marker[board]"),
                 expected("apart", "joint6.d camera[eye]"),
+                expected("apart", "camera[eye].k2 camera[eye].k3"),
                 expected("focal-length", "camera[eye] camera[eye].fx marker[board]"),
                 expected("scale", "joint1.d joint2.a joint6.d base camera[eye] marker[board]"),
             ]

@@ -259,8 +259,8 @@ impl Polyhedron {
         [side(&self.lower, 1.0), side(&self.upper, -1.0), rows].concat()
     }
 
-    /// Returns the faces whose distance from `q`, relative to the size of q, is at most
-    /// `tolerance`.
+    /// Returns the faces that `q` violates, or whose distance from `q`, relative to the size of q,
+    /// is at most `tolerance`.
     pub(super) fn faces_near(&self, q: &DVector<f64>, tolerance: f64) -> Faces {
         let distance = tolerance * q.amax().max(f64::MIN_POSITIVE);
         let bound = |j: usize| match q[j] {

@@ -49,8 +49,8 @@ pub fn contributions(contributions: &[Contribution]) -> Option<Drawing> {
     let caption = format!(
         "Root mean square displacement of the predicted positions of the measured poses if one \
          parameter returns to its nominal value (base and tool: to their values for the nominal \
-         arm), or one effect is removed, and everything else stays unchanged. Parameters that \
-         compensate each other both displace much.{note}"
+         arm), or one effect is removed, and everything else stays unchanged. Two parameters \
+         that compensate each other both show large displacements.{note}"
     );
     let rows = contributions.iter().map(|contribution| {
         let moved = fixed(contribution.moved * 1e3, 6);

@@ -82,7 +82,9 @@ impl Forest<'_> {
         let cells = self.rows.iter().flat_map(|(name, values)| {
             values.iter().zip(&self.legend).filter_map(move |(value, (of, _))| {
                 let (value, error) = (*value)?;
-                Some(vec![name.clone(), (*of).to_owned(), fixed(value, 6), fixed(error, 6)])
+                // A value without an interval is drawn with one of no width.
+                let error = if error > 0.0 { fixed(error, 6) } else { String::new() };
+                Some(vec![name.clone(), (*of).to_owned(), fixed(value, 6), error])
             })
         });
         let data = sheet(["name", "of", self.label, "half width of the interval"], cells);

@@ -40,8 +40,8 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
     let paper = comparison.paper.iter();
     entries.extend(paper.map(|procedure| entry(procedure.name(), &procedure.errors)));
     let caption = "Mean position error of each strategy at the fitted and at the held-out poses, on a logarithmic scale. A \
-                   wide gap between the two marks of a row means that the strategy fits noise. Solvers with the same result \
-                   share a row.";
+                   wide gap between the two marks of a row suggests that the strategy fits noise. \
+                   Solvers with the same result share a row.";
     let titles = ("Errors of the strategies", "Error of every strategy");
     draw_entries("strategies", titles, caption, &entries, ("best", &best(&entries)))
 }
@@ -81,7 +81,8 @@ pub fn draw_rounds(closure: &ClosedLoop) -> Option<Drawing> {
     let mut entries = vec![entry("as declared".to_owned(), &closure.before.fit.fitted)];
     entries.extend(closure.rounds.iter().enumerate().map(after));
     let caption = "Mean position error after each round of the loop, at the fitted poses and at the held-out ones, which do not \
-                   influence any choice, on a logarithmic scale. If the two diverge, a round has fitted noise.";
+                   influence any choice, on a logarithmic scale. If the two diverge, a round may \
+                   have fitted noise.";
     let titles = ("Errors after each round", "Error after every round");
     // A search that was interrupted, or that removed effects at its end, keeps another model than
     // that of its last round.

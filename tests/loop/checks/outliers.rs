@@ -22,7 +22,7 @@ fn outliers_are_named_and_are_not_structure() {
     println!("{check}");
     assert!(check.failed());
     assert_eq!(check.test, Test::Outliers { worst: Some(12) });
-    assert!(check.to_string().starts_with("pose 13 has an outlier: "));
+    assert!(check.to_string().starts_with("pose 13 is an outlier: "));
     assert_eq!(findings.outliers, [12, 40]);
     assert!(!findings.is_structured(), "{:?}", findings.strongest());
 }

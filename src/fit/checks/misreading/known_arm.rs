@@ -4,8 +4,9 @@ use nalgebra::DVector;
 
 use super::Misreading;
 use super::candidates::candidates;
+use super::first_of;
 use super::reversed::MAX_REVERSED;
-use super::search::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_RATIO_TO_BEST};
+use super::search::{MAX_CLEAR_RATIO, MAX_RATIO_TO_BEST};
 use crate::fit::Placement;
 use crate::measurement::Measurements;
 use crate::model::Model;
@@ -91,6 +92,6 @@ pub(crate) fn misread_table(
         );
         if may_be_of_arm { format!("{words} (or the arm has changed so)") } else { words }
     };
-    let named = explaining.iter().take(MAX_NAMED).map(|(misreading, _)| words(*misreading));
-    Some((named.collect::<Vec<_>>().join(", or "), best))
+    let named: Vec<String> = explaining.iter().map(|(misreading, _)| words(*misreading)).collect();
+    Some((first_of(&named), best))
 }

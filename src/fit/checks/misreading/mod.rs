@@ -26,8 +26,9 @@ pub(crate) use explanation::MisreadEffect;
 pub(in crate::fit) use images::is_of_views;
 pub(crate) use known_arm::misread_table;
 pub(in crate::fit) use masses::misread_masses;
-pub(in crate::fit) use search::{MAX_CLEAR_RATIO, MAX_NAMED, MAX_NOISE_SIGMAS};
+pub(in crate::fit) use search::{MAX_CLEAR_RATIO, MAX_NOISE_SIGMAS};
 pub(in crate::fit) use views::{start_of_fit, with_readings};
+pub(in crate::fit) use words::first_of;
 
 use crate::model::parameter::JointField;
 

@@ -67,7 +67,7 @@ pub(in crate::fit) const MAX_NOISE_SIGMAS: f64 = 5.0;
 /// sure although more than noise is left. Another cause that acts alike hardly removes as much.
 pub(in crate::fit) const MAX_CLEAR_RATIO: f64 = 0.02;
 /// Maximum number of misreadings that the text of the finding names.
-pub(in crate::fit) const MAX_NAMED: usize = 4;
+pub(super) const MAX_NAMED: usize = 4;
 /// Relative reduction of the cost by one step below which a registration without a full fit ends.
 /// The error is then accurate enough for a comparison at [`MAX_RATIO_TO_BEST`].
 const TRIAL_TOLERANCE: f64 = 1e-4;
