@@ -29,8 +29,9 @@ class Export(Result):
         return str(self._core.text)
 
     def write(self, file: Path) -> None:
-        """Writes it: whole, or not at all."""
+        """Writes it: whole, or not at all. A folder that is missing is made."""
         file = pathlib.Path(file)
+        file.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=file.parent) as folder:
             whole = pathlib.Path(folder) / file.name
             whole.write_bytes(self.text.encode())

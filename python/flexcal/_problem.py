@@ -17,6 +17,7 @@ from ._forward import Forward
 from ._least_squares import LeastSquares
 from ._progress import Told, told
 from ._restored import Spec
+from ._sections import HeldOut, toml_held_out, toml_number, with_data
 from ._tables import Data, Path, Source, asked, count, region, source, warn
 from .errors import InputError
 
@@ -43,6 +44,13 @@ MOST_SIMULATED = 1_000_000
 TEXT = "<text>"
 """What messages call a problem in memory."""
 
+FILL_IN = {
+    "target_m": "fill in target_m: where the measured point sits in the frame of the tip, roughly; now its origin",
+    "position_sigma_mm": "fill in position_sigma_mm: 1 σ of a coordinate that your instrument measures; now 0.05",
+    "held_out": "held_out: now 30 % of the poses are held out to judge the fit",
+}
+"""What a problem from a URDF leaves to its user, by its keys."""
+
 
 class Problem(Forward):
     """An arm as declared, what is free of it, and where its measurements are.
@@ -68,11 +76,19 @@ class Problem(Forward):
             self._hold(_core.Problem.read(problem))
 
     @classmethod
-    def from_urdf(cls, path: Path, base: str | None = None, tip: str | None = None) -> Problem:
+    def from_urdf(
+        cls,
+        path: Path,
+        base: str | None = None,
+        tip: str | None = None,
+        *,
+        position_sigma_mm: float | None = None,
+        held_out: HeldOut | None = None,
+    ) -> Problem:
         """The chain between two links of a URDF, as ``flexcal init`` writes it (docs/urdf.md).
 
-        ``[parameters]`` frees what measured positions tell apart; ``position_sigma_mm`` is a guess that only your instrument can
-        mend: ``Problem(problem.text.replace(…))``. Joints keep their names, and columns of data may go by them.
+        ``[parameters]`` frees what measured positions tell apart. Joints keep their names, and columns of data may go by them.
+        ``notes`` also name what is left to fill in.
 
         Parameters
         ----------
@@ -82,6 +98,10 @@ class Problem(Forward):
             Link from which the chain goes; the root, if it is not named.
         tip
             Link at its end; the only leaf, if it is not named.
+        position_sigma_mm
+            1 σ of a coordinate that your instrument measures; a guess, if it is not given.
+        held_out
+            Rows that judge and are not fitted: ``"none"``, their fraction, or the name of a session.
 
         Raises
         ------
@@ -92,9 +112,14 @@ class Problem(Forward):
         if "\n" in text or text.lstrip().startswith("<"):
             start = text.strip().partition("\n")[0][:40]
             raise InputError(f"path: the path of a URDF is needed, not its text ({start} …); write the text to a file first", key="path")
-        problem = cls.__new__(cls)
-        problem._hold(_core.Problem.from_urdf(path, base, tip, TEXT))
-        return problem
+        core = _core.Problem.from_urdf(path, base, tip, TEXT)
+        given: dict[str, str] = {}
+        if position_sigma_mm is not None:
+            given["position_sigma_mm"] = toml_number("position_sigma_mm", position_sigma_mm)
+        if held_out is not None:
+            given["held_out"] = toml_held_out(held_out)
+        notes = [*core.notes, *(note for key, note in FILL_IN.items() if key not in given)]
+        return _parsed(with_data(core.text, given), TEXT, notes)
 
     def _hold(self, core: _core.Problem) -> None:
         self._core = core
@@ -104,7 +129,7 @@ class Problem(Forward):
 
     @property
     def notes(self) -> list[str]:
-        """What to know of a problem that was made from a URDF (angles that were taken as right ones …)."""
+        """What to know of a problem that was made from a URDF (angles that were taken as right ones …), and what is to be filled in."""
         return self._core.notes
 
     @property
@@ -152,6 +177,7 @@ class Problem(Forward):
         remainder: bool = False,
         prior: Path | Identification | ClosedLoop | None = None,
         drift_days: float = 0.0,
+        held_out: HeldOut | None = None,
         progress: Told = False,
     ) -> Identification:
         """Fits the free parameters to the rows that are not held out.
@@ -173,6 +199,9 @@ class Problem(Forward):
             there are left out; or the ``PRIOR.toml`` of :func:`flexcal.fleet` (docs/life.md).
         drift_days
             Days since the earlier identification, by whose drift the prior is widened.
+        held_out
+            Rows that judge and are not fitted, instead of those that the problem says: ``"none"``, as for the last fit of all
+            rows, their fraction, or the name of a session. The result's ``problem`` says so.
         progress
             A function that is called with a :class:`Progress` at every step, or True for a line on standard error.
 
@@ -181,6 +210,11 @@ class Problem(Forward):
         InputError
             A mistake in the measurements; problem, data, strategy and solver do not fit each other.
         """
+        if held_out is not None:
+            text = with_data(self._core.text, {"held_out": toml_held_out(held_out)})
+            return _parsed(text, str(self._core.file), self._core.notes).identify(
+                data, strategy, solver, remainder=remainder, prior=prior, drift_days=drift_days, progress=progress
+            )
         given = self._given_data(data)
         read = self._read(given)
         with told(progress) as step:

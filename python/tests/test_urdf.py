@@ -37,7 +37,12 @@ def test_from_urdf(
     if words is None:
         problem = flexcal.Problem.from_urdf(urdf, base, tip)
         assert problem.text == (out / "problem.toml").read_text()
-        assert problem.notes and all(f"note: {note}\n" in run.stdout for note in problem.notes)
+        *notes, target, sigma, held_out = problem.notes
+        assert notes and all(f"note: {note}\n" in run.stdout for note in notes)
+        # What is left to fill in.
+        for note, name in ((target, "target_m"), (sigma, "position_sigma_mm"), (held_out, "held_out")):
+            words = note.removeprefix("fill in ").removeprefix(f"{name}: ")
+            assert f"{name} " in run.stdout and words.split(";")[0].split(" in the frame")[0] in run.stdout
         return
     with pytest.raises(flexcal.InputError, match=words) as caught:
         flexcal.Problem.from_urdf(urdf, base, tip)
@@ -84,3 +89,25 @@ def test_export_urdf(command: Command, tmp_path: Path) -> None:
         result.export_urdf(other)
     run, _ = command("export", tmp_path, *estimate, "--urdf", other)
     assert run.returncode == 2 and str(caught.value) in run.stderr and caught.value.file == str(other)
+
+
+@pytest.mark.filterwarnings("ignore::flexcal.FlexcalWarning")
+def test_sigma_and_held_out_rows_are_arguments(tmp_path: Path) -> None:
+    bench = ROOT / "problems" / "bench-arm"
+    problem = flexcal.Problem.from_urdf(bench / "arm.urdf", position_sigma_mm=0.1, held_out=0.2)
+    assert "position_sigma_mm = 0.1 " in problem.text and "held_out = { fraction = 0.2, seed = 1 } " in problem.text
+    assert [note.partition(":")[0] for note in problem.notes[-1:]] == ["fill in target_m"]
+    fitted = problem.identify(bench / "measurements.csv", held_out="none")
+    assert 'held_out = "none"' in fitted.problem.text and fitted.held_out_error.rows == "left_out"
+    assert problem.identify(bench / "measurements.csv").held_out_error.rows == "held_out"
+    for wrong in (1.5, 0, "", True):
+        with pytest.raises(flexcal.InputError, match="held_out: .* is neither"):
+            problem.identify(held_out=wrong)
+    with pytest.raises(flexcal.InputError, match="is not above 0"):
+        flexcal.Problem.from_urdf(bench / "arm.urdf", position_sigma_mm=-1.0)
+    inline = flexcal.Problem("name = 'a'\n[[joint]]\na_m = 0.5\n")
+    with pytest.raises(flexcal.InputError, match=r"no section \[data\]"):
+        inline.identify(held_out="none")
+    exported = fitted.export_urdf(bench / "arm.urdf")
+    exported.write(tmp_path / "new" / "arm.urdf")
+    assert (tmp_path / "new" / "arm.urdf").read_text() == exported.text

@@ -1,0 +1,55 @@
+"""Keys of ``[data]`` in the text of a problem."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Literal, TypeAlias
+
+from .errors import InputError
+
+HeldOut: TypeAlias = "Literal['none'] | float | str"
+"""Rows that judge and are not fitted: none, their fraction, or the name of a session."""
+
+
+def toml_number(name: str, value: float) -> str:
+    """A number above 0 as TOML."""
+    number = float(value)
+    if not (math.isfinite(number) and number > 0.0):
+        raise InputError(f"{name}: {value!r} is not above 0", key=name)
+    return repr(number)
+
+
+def toml_held_out(held_out: HeldOut) -> str:
+    """The value of ``held_out``, as docs/problem.md has it."""
+    if isinstance(held_out, str):
+        if held_out == "none":
+            return '"none"'
+        if held_out and not re.search(r'["\\\x00-\x1f]', held_out):
+            return f'{{ session = "{held_out}" }}'
+    elif isinstance(held_out, (int, float)) and not isinstance(held_out, bool) and 0.0 < held_out < 1.0:
+        return f"{{ fraction = {float(held_out)!r}, seed = 1 }}"
+    raise InputError(
+        f"held_out: {held_out!r} is neither \"none\" nor a fraction between 0 and 1 nor the name of a session", key="held_out"
+    )
+
+
+def with_data(text: str, values: dict[str, str]) -> str:
+    """The text of a problem with other values of keys of ``[data]``, each of which stands on a line of its own or is added."""
+    for key, value in values.items():
+        head = re.search(r"^[ \t]*\[data\][ \t]*(#.*)?$", text, re.MULTILINE)
+        dotted = re.search(rf"^[ \t]*data\.{key}[ \t]*=", text, re.MULTILINE)
+        if dotted:
+            start, end = dotted.start(), len(text)
+        elif head:
+            after = re.search(r"^[ \t]*\[", text[head.end() :], re.MULTILINE)
+            start, end = head.end(), head.end() + after.start() if after else len(text)
+        else:
+            raise InputError(f"{key}: the problem has no section [data] in which it could be written", key=key)
+        part = text[start:end]
+        line = rf"^([ \t]*(?:data\.)?{key}[ \t]*=[ \t]*)[^#\n]*?([ \t]*(?:#.*)?)$"
+        part, count = re.subn(line, lambda found: found[1] + value + found[2], part, count=1, flags=re.MULTILINE)
+        if count == 0:
+            part = f"\n{key} = {value}{part}"
+        text = text[:start] + part + text[end:]
+    return text
