@@ -11,6 +11,8 @@ mod arms;
 mod bad;
 #[path = "observations/bench.rs"]
 mod bench;
+#[path = "observations/camera_plans.rs"]
+mod camera_plans;
 #[path = "observations/cameras.rs"]
 mod cameras;
 #[path = "observations/derivatives.rs"]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
 use flexcal::error::WarningKind;
-use flexcal::fit::{self, Options, SolverChoice, Strategy};
+use flexcal::fit::{self, Identification, Options, SolverChoice, Strategy};
 use flexcal::life::{PriorError, Update, update};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Freedom, HeldOut, ParameterRule, Problem};
@@ -215,10 +215,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let is_structured = shown.residual_tests.is_structured();
         let estimate = results.path("estimate.json");
         let mut warnings = data.measurements.warnings.iter();
-        let is_trusted = identification.is_trusted();
-        let is_cause =
-            |kind: &WarningKind| kind.refutes_table() || kind.says_that_loads_lack() && !is_trusted;
-        let next = if warnings.any(|warning| is_cause(&warning.kind)) {
+        let next = if warnings.any(|warning| is_cause(&warning.kind, &identification)) {
             format!(
                 "correct the table as the warning says, then flexcal identify {}",
                 common.problem_arguments()
@@ -233,4 +230,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn(words);
     }
     Ok(outcome)
+}
+
+/// Returns true if a warning about the table says why the fit is not to be trusted.
+fn is_cause(kind: &WarningKind, found: &Identification) -> bool {
+    kind.refutes_table() || kind.says_that_loads_lack() && !found.is_trusted()
 }

@@ -97,7 +97,9 @@ impl Bounds {
         let factor = scores.quantile(level);
         let lengths = poses.iter().map(|pose| factor * pose.size).collect();
         let scale = scores.scale().unwrap_or(1.0);
-        poses.iter_mut().for_each(|pose| pose.covariance *= scale * scale);
+        for pose in &mut poses {
+            pose.covariance *= scale * scale;
+        }
         Self { level, poses, lengths, scale, learned_from: scores.configurations }
     }
 

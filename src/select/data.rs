@@ -151,7 +151,9 @@ impl<'a> Data<'a> {
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
             is_one_payload: payload.as_ref().is_none_or(|values| {
                 let mut carried = values.iter().filter(|payload| **payload > 0.0);
-                carried.next().is_none_or(|first| carried.all(|payload| payload == first))
+                carried
+                    .next()
+                    .is_none_or(|first| carried.all(|payload| payload.total_cmp(first).is_eq()))
             }),
             payload: payload.map_or([problem.tool.payload_mass; 2].into(), range),
             ranges: (0..n).map(column).collect(),

@@ -5,6 +5,8 @@ use std::path::Path;
 use flexcal::fit::{FindingCode, Identification, Options, identify};
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
+use flexcal::select::close;
+use serde_json::Value;
 
 use crate::cameras::{measured_with, split};
 use crate::common::arms::parse;
@@ -236,4 +238,21 @@ fn a_camera_problem_begins_with_a_urdf_alone() {
     let seen = folder.table("seen/measurements.csv");
     let poses: std::collections::BTreeSet<&String> = seen.rows.iter().map(|row| &row[0]).collect();
     assert_eq!(poses.len(), 3);
+}
+
+#[test]
+fn an_error_of_the_lens_is_not_called_one_of_the_arm() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let free = std::fs::read_to_string(folder.join("problem.toml")).unwrap();
+    // The distortion of the true lens is held at 0.
+    let held = parse(&free.replace("\"camera*\" = { free = true }\n", ""));
+    let table = std::fs::read_to_string(folder.join("data.csv")).unwrap();
+    let data = split(&held, read_table(&held, &table));
+    let closed = close(&held, &data, &Options::default()).unwrap();
+    let finding = closed.before.fit.finding(FindingCode::LensContradicted).unwrap();
+    let names = finding.value("parameters").unwrap().as_array().unwrap();
+    assert!(names.contains(&Value::from("camera[hand].k1")), "{finding}");
+    assert!(closed.effects.is_empty(), "{:?}", closed.effects);
+    let found = identify(&parse(&free), &data, &Options::default()).unwrap();
+    assert!(!found.has(FindingCode::LensContradicted) && found.is_trusted());
 }

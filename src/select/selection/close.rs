@@ -238,11 +238,7 @@ pub fn close_by(
     let has_formula = state.added(&fitted).iter().any(Effect::is_composed);
     let is_open = (verdict == Verdict::Unexplained || has_formula) && !interrupted;
     let gravity = is_open.then(|| other_gravity(&state, &declared, &fitted)).flatten();
-    let verdict = if gravity.is_some() { Verdict::Unexplained } else { verdict };
-    if gravity.is_some() {
-        let composed = effects.iter_mut().filter(|found| found.effect.is_composed());
-        composed.for_each(|found| found.status = Status::Located);
-    }
+    let verdict = if gravity.is_some() { locate_composed(&mut effects) } else { verdict };
     let mut after = fitted.found;
     after.findings.splice(0..0, orientations.into_iter().chain(gravity));
     if !interrupted {
@@ -451,4 +447,13 @@ fn mean_gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> In
     let sums: Vec<(f64, f64)> =
         groups.values().map(|gains| (gains.iter().sum::<f64>(), gains.len() as f64)).collect();
     mean_interval(&sums, RESAMPLES, INTERVAL_LEVEL, data.rules.seed)
+}
+
+/// Lowers composed laws to located effects, because another direction of gravity explains as much.
+/// Returns the verdict with it.
+fn locate_composed(effects: &mut [Found]) -> Verdict {
+    for found in effects.iter_mut().filter(|found| found.effect.is_composed()) {
+        found.status = Status::Located;
+    }
+    Verdict::Unexplained
 }
