@@ -50,7 +50,7 @@ pub(crate) use difference::{HeldOutRow, Side, difference, predicts_better};
 pub(crate) use fleet::fleet;
 pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};
-pub(crate) use init::init_text;
+pub(crate) use init::{init_text, sheet_text};
 pub(crate) use noise::influential_rows_advice;
 pub(crate) use predict::prediction;
 pub(crate) use prior::is_prior_contradicted;
