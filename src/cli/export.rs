@@ -194,6 +194,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let alone = geometry.fitted_alone.as_ref();
     let workspace = geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]);
     let mut remarks = report::ExportRemarks::new((workspace, problem.tool.payload_mass), alone);
+    if matches!(arguments.format, Some(Format::Dh | Format::Mdh)) {
+        remarks.found = report::set_up_at(&model, x.as_slice());
+    }
     let Rendered { text, moved, name: default, elsewhere } =
         render(arguments, &problem, (&model, &x), (arm, &mut remarks))?;
     let path = flags.out.clone().unwrap_or_else(|| flags.folder(&problem.name).join(default));

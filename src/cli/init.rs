@@ -4,9 +4,10 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
+use flexcal::problem::Problem;
 use flexcal::report;
 use flexcal::results::{Document as _, InitResult};
-use flexcal::urdf::{Chain, Robot, describe_measured};
+use flexcal::urdf::{Chain, Robot, complete, describe_measured};
 
 use super::diagnostic;
 use super::flags::Flags;
@@ -20,10 +21,11 @@ use super::outcome::Outcome;
   flexcal init panda.urdf --tip panda_link8 --out panda
   flexcal init panda.urdf --tip panda_link8 --out panda --board 9x6x25
   flexcal init humanoid.urdf --tip head_camera --tip right_hand --board 9x6x25
+  flexcal init sheet.toml --out my-arm
   flexcal identify panda --data measurements.csv"
 )]
 pub struct Arguments {
-    /// The URDF (expand a xacro first)
+    /// The URDF (expand a xacro first), or a table of joints typed from a data sheet, ARM.toml
     #[arg(value_name = "ARM.urdf")]
     urdf: PathBuf,
     /// Link at the base of the arm [default: the root]
@@ -63,8 +65,29 @@ fn parse_board(text: &str) -> Result<Board, String> {
     Ok(([count(columns)?, count(rows)?], distance))
 }
 
-/// Writes the chain of a URDF between two links as `problem.toml`.
+/// Completes the problem of an arm that was typed from a data sheet.
+fn complete_sheet(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let has_link = arguments.base.iter().chain(&arguments.tip).next().is_some();
+    if has_link || arguments.board.is_some() {
+        return Err("--base, --tip and --board belong to a URDF, not to a table of joints".into());
+    }
+    let (problem, text) = Problem::read_with_text(&arguments.urdf)?;
+    let description = complete(&problem, &text)?;
+    let flags = &arguments.flags;
+    let results =
+        flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
+    results.write(&[("problem.toml", &description.text)])?;
+    let file = results.path("problem.toml");
+    let json = InitResult::of_sheet(&problem, &description, &file).to_json();
+    flags.print_result(&json, || report::sheet_text(&problem, &description, &results.folder))?;
+    Ok(Outcome::Done)
+}
+
+/// Writes the chain of a URDF between two links as `problem.toml`, or completes a typed problem.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    if arguments.urdf.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+        return complete_sheet(arguments);
+    }
     if let Some((_, mm)) = arguments.board.filter(|board| !USUAL_SQUARES_MM.contains(&board.1)) {
         diagnostic::warn(&format!(
             "--board: corners that are {mm} mm apart? The third number is in mm, such as 25 for \

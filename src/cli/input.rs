@@ -122,7 +122,7 @@ impl Common {
                     TableErrorKind::NothingJoined { .. }
                         | TableErrorKind::MostUnpaired { .. }
                         | TableErrorKind::CommonPartner { .. }
-                        | TableErrorKind::ManyRowsToPair { .. }
+                        | TableErrorKind::OtherRowsToPair { .. }
                 )
             )
         };

@@ -76,7 +76,10 @@ pub(super) fn missing_date_hint(value: &str) -> String {
     let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
     let is_clock = value.contains(':') && parts.all(is_number);
     if is_clock {
-        format!("; its date is missing: write 2024-05-31T{value}")
+        format!(
+            "; its date is missing: write 2024-05-31T{value}, or, if another column holds the dates, \
+             \"…\" = \"date\" in [data.columns]"
+        )
     } else {
         String::new()
     }
@@ -196,15 +199,15 @@ pub(super) fn compared_keys(keys: Option<&[String; 2]>) -> String {
 const MAX_OFF_HOUR: f64 = 2e-3;
 
 /// Returns the remedy for clocks that differ. `offset` is the value of `offset_s` \[s\] that pairs
-/// most rows; the text is empty for `None`.
-pub(super) fn clock_offset_remedy(offset: Option<&str>) -> String {
-    offset.map_or_else(String::new, |offset| {
+/// most rows, and the assignment of a larger tolerance if they need one; the text is empty for `None`.
+pub(super) fn clock_offset_remedy(offset: Option<&[String; 2]>) -> String {
+    offset.map_or_else(String::new, |[offset, tolerance]| {
         let hours = offset.parse::<f64>().map_or(0.0, |seconds| seconds / 3600.0);
         let is_zone = hours.abs() > 0.5 && (hours - hours.round()).abs() < MAX_OFF_HOUR;
         let zone = if is_zone { " (by whole hours, as for summer time or UTC)" } else { "" };
         format!(
             "; with the clock of the joint table moved by {offset} s the rows have partners: the \
-             clocks differ{zone}, so write offset_s = {offset} in joints"
+             clocks differ{zone}, so write offset_s = {offset}{tolerance} in joints"
         )
     })
 }

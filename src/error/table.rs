@@ -39,14 +39,14 @@ pub enum TableErrorKind {
         nearest_in_time_hint(gap.as_deref()),
         compared_keys(keys.as_ref()),
         if offset.is_some() {
-            clock_offset_remedy(offset.as_deref())
+            clock_offset_remedy(offset.as_ref())
         } else {
             "; check the column of the join (pose or time), whether both clocks agree, and \
              tolerance_s"
                 .to_owned()
         }
     )]
-    NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<String> },
+    NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<[String; 2]> },
     #[error(
         "{left} of {rows} measured rows have no partner in the joint table, because tolerance_s is \
          too small: the nearest row is typically {gap} away, and rows of the joint table are \
@@ -60,36 +60,49 @@ pub enum TableErrorKind {
     )]
     SecondsLost { table: &'static str },
     #[error(
-        "{left} of {rows} measured rows have no partner in the joint table{}{}",
+        "{left} of {rows} measured rows have no partner in the joint table{}{}{}",
         nearest_in_time_hint(gap.as_deref()),
-        clock_offset_remedy(Some(offset.as_str()))
+        compared_keys(keys.as_ref()),
+        if offset.is_some() {
+            clock_offset_remedy(offset.as_ref())
+        } else {
+            ", and no other offset of the clocks certainly pairs them; check whether both clocks \
+             agree, offset_s and tolerance_s, and leave out rows that the joint table does not log"
+                .to_owned()
+        }
     )]
-    MostUnpaired { left: usize, rows: usize, gap: Option<String>, offset: String },
+    MostUnpaired {
+        left: usize,
+        rows: usize,
+        gap: Option<String>,
+        keys: Option<[String; 2]>,
+        offset: Option<[String; 2]>,
+    },
     #[error(
         "{same} of {rows} measured rows have the same partner, {partner}, an end of the joint \
          table; check whether both clocks agree, and tolerance_s{}{}",
         compared_keys(keys.as_ref()),
-        clock_offset_remedy(offset.as_deref())
+        clock_offset_remedy(offset.as_ref())
     )]
     CommonPartner {
         same: usize,
         rows: usize,
         partner: String,
         keys: Option<[String; 2]>,
-        offset: Option<String>,
+        offset: Option<[String; 2]>,
     },
     #[error(
         "the rows of both tables are typically {gap} apart, less than tolerance_s allows, and \
          may belong to different poses{}",
-        clock_offset_remedy(Some(offset.as_str()))
+        clock_offset_remedy(Some(offset))
     )]
-    ClocksDiffer { gap: String, offset: String },
+    ClocksDiffer { gap: String, offset: [String; 2] },
     #[error(
         "the joint table has {logged} rows for {rows} measured rows, and by = \"order\" pairs the \
-         first with the first; write by = \"time\" or by = \"name\", or keep one row for each \
-         measured row"
+         first with the first, so that all pairs behind a row without a partner are wrong; write \
+         by = \"time\" or by = \"name\", or keep one row for each measured row"
     )]
-    ManyRowsToPair { logged: usize, rows: usize },
+    OtherRowsToPair { logged: usize, rows: usize },
     #[error(
         "by = \"order\" pairs {} with {}, and most of these names occur in both tables; write by = \
          \"name\", or sort the tables alike",
@@ -98,10 +111,11 @@ pub enum TableErrorKind {
     OrderContradicted { pair: [String; 2] },
     #[error(
         "{left} of {rows} measured rows have no partner of the same name in the joint table, but \
-         most differ from one only in spelling, as {} and {}; write the names alike",
+         most differ from one only in {difference}, as {} and {}; if these belong together, write \
+         the names alike, or join the tables by time",
         pair[0], pair[1]
     )]
-    NamesWrittenOtherwise { left: usize, rows: usize, pair: [String; 2] },
+    NamesWrittenOtherwise { left: usize, rows: usize, difference: &'static str, pair: [String; 2] },
     #[error(
         "no held-out row measures a position, and pose accuracy is of positions: hold out rows \
          with x_mm, y_mm and z_mm, measured by \

@@ -18,6 +18,11 @@ pub enum WarningKind {
     )]
     ColumnIgnored { meant: Option<String>, is_angle: bool },
     #[error(
+        "unknown columns; ignored (name in [data.covariates] those that the arm may depend on): {}{}",
+        names.join(", "), and_more(*more)
+    )]
+    ColumnsIgnored { names: Vec<String>, more: usize },
+    #[error(
         "no column of {} has a name of [data.columns]; the table is read by flexcal's names",
         file.display()
     )]
@@ -33,13 +38,18 @@ pub enum WarningKind {
     #[error(
         "{rows} row{} without a partner in the other table, the first here{}; left out{}{}{}",
         plural(*rows), listed(*rows, others), nearest_in_time_hint(gap.as_deref()),
-        if gap.is_some() { "; check whether both clocks agree, and tolerance_s" } else { "" },
+        match (gap, tolerance) {
+            (Some(_), Some(tolerance)) => format!("; tolerance_s = {tolerance} would pair them too"),
+            (Some(_), None) => "; check whether both clocks agree, and tolerance_s".to_owned(),
+            (None, _) => String::new(),
+        },
         spelling_hint(alike.as_ref())
     )]
     WithoutPartner {
         rows: usize,
         others: Vec<String>,
         gap: Option<String>,
+        tolerance: Option<String>,
         alike: Option<(usize, [String; 2])>,
     },
     #[error("changed since flexcal wrote it; used all the same")]

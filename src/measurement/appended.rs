@@ -24,6 +24,8 @@ pub(super) struct Appended {
 pub(super) struct JointTableFormat {
     pub style: CellStyle,
     pub date_order: DateOrder,
+    /// Columns of a date and of the time of day beside it.
+    pub date_columns: Option<[usize; 2]>,
     /// File and line of the header.
     pub header_place: (PathBuf, usize),
 }

@@ -42,6 +42,11 @@ impl Beginning {
         lines.skip(1).map(|line| cells(line, self.layout.delimiter)).collect()
     }
 
+    /// Returns the cells of the first row; empty without a row.
+    pub fn first_row(&self) -> Vec<String> {
+        self.rows().into_iter().next().unwrap_or_default()
+    }
+
     /// Returns true if the numbers have decimal points: one has a point that cannot separate
     /// thousands, and none has a comma or several points.
     pub fn has_decimal_points(&self) -> bool {

@@ -2,12 +2,16 @@
 
 use csv::ByteRecord;
 
+use super::paired_times::median;
 use crate::error::{Location, Warning, WarningKind};
 use crate::problem::JoinRule;
+use crate::quantity::format::two_digits;
 
-/// Maximum time between paired rows when a shift between the clocks is searched, unless the problem
-/// allows more \[s\].
+/// Maximum time between paired rows when a shift between the clocks is searched \[s\].
 const PAIR_GAP: f64 = 0.5;
+/// Largest such time with which a shift is searched if smaller ones find none \[s\]: readings may
+/// follow a stop by a varying time. Each is twice the one before.
+const MAX_PAIR_GAP: f64 = 32.0;
 /// Maximum number of rows of the joint table for which a shift is searched. A table with more rows
 /// is a continuous log, in which every shift finds partners.
 const MAX_LOG_ROWS: usize = 2000;
@@ -18,6 +22,8 @@ const MAX_TESTED_ROWS: usize = 200;
 const TRIAL_ROWS: usize = 8;
 /// Smallest number of pairs of rows with which a shift is accepted.
 const MIN_PAIRS: usize = 5;
+/// The same for rows that are paired over more than [`PAIR_GAP`], where fewer pair by chance.
+const MIN_WIDE_PAIRS: usize = 10;
 /// Smallest fraction of the tested rows that a shift must pair.
 const MIN_PAIRED_FRACTION: f64 = 0.8;
 /// Largest number of pairs that another shift may have, as a fraction of those of the best shift.
@@ -90,35 +96,48 @@ pub(super) fn rests<'r>(
     rests
 }
 
-/// Returns the shift \[s\] that must be added to the times of a joint table, so that its rows pair
-/// best with the rows measured at `times` \[s\].
+/// Difference between the clocks of two tables.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ClockShift {
+    /// Time that must be added to the times of the joint table \[s\].
+    pub seconds: f64,
+    /// Largest time between rows that the shift pairs \[s\]; 0 if they fall into rests.
+    pub gap: f64,
+}
+
+/// Returns the shift of the times of a joint table with which its rows pair best with the rows
+/// measured at `times` \[s\].
 ///
 /// `log` are the times of the joint table in ascending order \[s\], and `rests` those in which the
-/// arm rests. Rows pair if their times differ by at most `tolerance` \[s\], or by half a second if
-/// that is more. Returns `None` if no shift pairs most rows, or if several do.
-pub(super) fn best_shift(
-    times: &[f64],
-    (log, rests): (&[f64], &[Rest]),
-    tolerance: f64,
-) -> Option<f64> {
-    let resting = (MIN_RESTING_FRACTION, MAX_RESTING_RIVAL_FRACTION);
-    if let Some(shift) = shift_to(times, (rests, PAIR_GAP), resting) {
-        return Some(shift);
+/// arm rests. The least time between paired rows that makes a shift certain is taken. Returns `None`
+/// if no shift pairs most rows, or if several do.
+pub(super) fn best_shift(times: &[f64], (log, rests): (&[f64], &[Rest])) -> Option<ClockShift> {
+    let resting = (MIN_PAIRS, MIN_RESTING_FRACTION, MAX_RESTING_RIVAL_FRACTION);
+    if let Some(seconds) = shift_to(times, (rests, PAIR_GAP), resting) {
+        return Some(ClockShift { seconds, gap: 0.0 });
     }
     if log.len() > MAX_LOG_ROWS {
         return None;
     }
     let rows: Vec<Rest> = log.iter().map(|&time| Rest { first: time, last: time }).collect();
-    shift_to(times, (&rows, tolerance.max(PAIR_GAP)), (MIN_PAIRED_FRACTION, MAX_RIVAL_FRACTION))
+    let gaps = std::iter::successors(Some(PAIR_GAP), |gap| Some(2.0 * gap));
+    gaps.take_while(|gap| *gap <= MAX_PAIR_GAP).find_map(|most| {
+        let least = if most > PAIR_GAP { MIN_WIDE_PAIRS } else { MIN_PAIRS };
+        let limits = (least, MIN_PAIRED_FRACTION, MAX_RIVAL_FRACTION);
+        let seconds = shift_to(times, (&rows, most), limits)?;
+        let gaps = times.iter().filter_map(|time| Some(nearest(log, time - seconds)?.1));
+        let gap = gaps.filter(|gap| *gap <= 2.0 * most).fold(0.0, f64::max);
+        Some(ClockShift { seconds, gap })
+    })
 }
 
-/// Returns the shift \[s\] with which most of the `times` fall into different `rests`, or within
-/// `gap` \[s\] of them; `None` if these are less than the share `least` of the times, or if another
+/// Returns the shift \[s\] with which at least `least_pairs` of the `times`, and the share `least` of
+/// them, fall into different `rests`, or within `gap` \[s\] of them; `None` if fewer do, or if another
 /// shift pairs more than the share `most_of_rival` of them.
 fn shift_to(
     times: &[f64],
     (rests, gap): (&[Rest], f64),
-    (least, most_of_rival): (f64, f64),
+    (least_pairs, least, most_of_rival): (usize, f64, f64),
 ) -> Option<f64> {
     let tested = evenly(times, MAX_TESTED_ROWS);
     let count = |shift: f64| {
@@ -138,15 +157,13 @@ fn shift_to(
     let is_rival = |&&(pairs, shift): &&(usize, f64)| {
         (shift - best).abs() > apart && pairs as f64 > most_of_rival * most as f64
     };
-    let is_clear = most >= MIN_PAIRS && most as f64 >= least * tested.len() as f64;
+    let is_clear = most >= least_pairs && most as f64 >= least * tested.len() as f64;
     if !is_clear || counted.iter().any(|counted| is_rival(&counted)) {
         return None;
     }
-    let mut differences: Vec<f64> = pairs(&tested, (rests, gap), best)
-        .filter_map(|(time, rest)| rests.get(rest).map(|rest| time - rest.middle()))
-        .collect();
-    differences.sort_by(f64::total_cmp);
-    differences.get(differences.len() / 2).copied()
+    let differences = pairs(&tested, (rests, gap), best)
+        .filter_map(|(time, rest)| rests.get(rest).map(|rest| time - rest.middle()));
+    median(differences.collect())
 }
 
 /// Returns the warning that the arm moved at the times \[s\] of some measured rows, by a log that is
@@ -179,7 +196,7 @@ const MAX_OFF_QUARTER: f64 = 2.0;
 /// Returns the whole quarters of an hour \[s\] that must be added to `times` \[s\], those of the
 /// rows without a partner, so that they have partners in `log`. `None` if no such shift is certain.
 fn zone_change(times: &[f64], log: &[f64]) -> Option<f64> {
-    let shift = -best_shift(times, (log, &[]), PAIR_GAP)?;
+    let shift = -best_shift(times, (log, &[]))?.seconds;
     let whole = (shift / QUARTER_HOUR).round() * QUARTER_HOUR;
     (whole != 0.0 && (shift - whole).abs() < MAX_OFF_QUARTER).then_some(whole)
 }
@@ -234,6 +251,32 @@ fn nearest_rest(rests: &[Rest], time: f64) -> Option<(usize, f64)> {
     around.filter_map(gap).min_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
+/// Largest number of rows by which positions and configurations are compared as shifted.
+const MAX_SHIFTED_ROWS: i8 = 3;
+
+/// Returns for each number of rows, by which positions may come after their configurations, the shift
+/// \[s\] of the log that pairs them so: the median time from the row of the log, which is the partner
+/// of an earlier measured row, to the measured row. Rows measured at `times` are partners of rows of
+/// the log within the `tolerance` \[s\].
+pub(super) fn shifts_by_rows(times: &[f64], log: &[f64], tolerance: f64) -> Vec<(i8, f64)> {
+    let partner = |&time: &f64| nearest(log, time).filter(|(_, gap)| *gap <= tolerance);
+    let pairs = times.iter().filter_map(|time| Some((*time, *log.get(partner(time)?.0)?)));
+    let pairs: Vec<(f64, f64)> = pairs.collect();
+    let shift = |by: i8| {
+        let logged = |row: usize| pairs.get(row.checked_add_signed(-isize::from(by))?);
+        let rows = pairs.iter().enumerate();
+        let apart = rows.filter_map(|(row, (time, _))| Some(time - logged(row)?.1));
+        Some((by, median(apart.collect())?))
+    };
+    (-MAX_SHIFTED_ROWS..=MAX_SHIFTED_ROWS).filter_map(shift).collect()
+}
+
+/// Returns a time \[s\] rounded up to two digits.
+pub(super) fn rounded_up(time: f64) -> String {
+    let digit = 10_f64.powf(time.log10().floor() - 1.0);
+    two_digits((time / digit - 1e-6).ceil() * digit, 6)
+}
+
 /// Returns the index of the entry of `log` that is nearest to `time`, and the time between them
 /// \[s\]; `None` if `log` is empty. `log` must be in ascending order.
 pub(super) fn nearest(log: &[f64], time: f64) -> Option<(usize, f64)> {
@@ -252,20 +295,21 @@ mod tests {
         let uneven: Vec<f64> =
             (0..30).map(|k| f64::from(k * 8) + f64::from(k * k % 31) / 4.0).collect();
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
-        let shift = best_shift(&late, (&uneven, &[]), 0.0).unwrap_or(0.0);
-        assert!((shift - 47.03).abs() < 1e-9, "{shift}");
-        // Stamps that scatter by more than half a second need a tolerance.
+        let shift = |times: &[f64], log: &[f64]| {
+            best_shift(times, (log, &[])).map_or([f64::NAN; 2], |shift| [shift.seconds, shift.gap])
+        };
+        let [seconds, gap] = shift(&late, &uneven);
+        assert!((seconds - 47.03).abs() < 1e-9 && gap < 1e-9, "{seconds} {gap}");
+        // Stamps that scatter by more than half a second.
         let slow: Vec<f64> = uneven.iter().map(|time| 6.0 * time).collect();
         let scattered =
             |k: usize, time: &f64| time + 73.4 + if k.is_multiple_of(2) { 1.4 } else { 0.0 };
         let late: Vec<f64> = slow.iter().enumerate().map(|(k, time)| scattered(k, time)).collect();
-        assert_eq!(best_shift(&late, (&slow, &[]), 0.5), None);
-        let shift = best_shift(&late, (&slow, &[]), 2.0).unwrap_or(0.0);
-        assert!((shift - 74.1).abs() < 0.8, "{shift}");
+        let [seconds, gap] = shift(&late, &slow);
+        assert!((seconds - 74.1).abs() < 0.8 && (0.7..1.5).contains(&gap), "{seconds} {gap}");
         let even: Vec<f64> = (0..30).map(|k| f64::from(k * 8)).collect();
         let late: Vec<f64> = even.iter().map(|time| time + 47.03).collect();
-        assert_eq!(best_shift(&late, (&even, &[]), 0.0), None);
-        assert_eq!(best_shift(&[], (&even, &[]), 0.0), None);
+        assert!(shift(&late, &even)[0].is_nan() && shift(&[], &even)[0].is_nan());
         let late: Vec<f64> = uneven.iter().map(|time| time + 3600.3).collect();
         assert_eq!(zone_change(&late, &uneven), Some(-3600.0));
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
@@ -289,12 +333,12 @@ mod tests {
         let rests = rests(rows.iter().map(|(time, cells)| (*time, cells)), Some(0));
         assert_eq!(rests.len(), 40);
         let log: Vec<f64> = rows.iter().map(|(time, _)| *time).collect();
-        let shift = best_shift(&measured, (&log, &rests), 0.5).unwrap();
+        let shift = best_shift(&measured, (&log, &rests)).unwrap().seconds;
         let place = Location::file(std::path::Path::new("problem.toml"));
         let moved = |shift: f64| {
             let times: Vec<f64> = measured.iter().map(|time| time - shift).collect();
             let best = || {
-                let shift = best_shift(&times, (&log, &rests), 0.5)?;
+                let shift = best_shift(&times, (&log, &rests))?.seconds;
                 Some((shift, format!("{shift:.0}")))
             };
             moving_arm((&times, &rests), best, &place).map(|warning| warning.kind)

@@ -66,7 +66,7 @@ impl Columns {
         let mut names = BTreeMap::new();
         let ours = named.iter().map(str::to_owned).collect();
         let mut columns = Self { read: Vec::new(), marked: None, file: None, names: ours };
-        let (mut unknown, mut mistyped, mut unmapped) = (Vec::new(), None, Vec::new());
+        let (mut unknown, mut unmapped, mut mistyped) = (Vec::new(), Vec::new(), None);
         let (mut shifted, mut hidden) = (None, None);
         let is_result_table = named.iter().any(is_unmistakable_result);
         for (place, name, rule) in named.mapped_first() {
@@ -114,7 +114,8 @@ impl Columns {
                     }
                     columns.read.push(Column { role, place, to_si });
                 }
-                Meaning::Ignored(_) | Meaning::Unknown if is_marked => {}
+                Meaning::Ignored(_) | Meaning::Unknown
+                    if is_marked || table.is_read_as_date(place) => {}
                 // If the name of another joint column is misspelt, the numbers of the columns are
                 // assigned to other joints.
                 Meaning::Ignored(WarningKind::JointIgnored { .. }) if rule.is_some() => {
@@ -144,9 +145,8 @@ impl Columns {
                 }
                 Meaning::Unknown => {
                     unknown.push(name);
-                    let is_suggested = unknown.len() <= MAX_SUGGESTIONS;
-                    let meant =
-                        is_suggested.then(|| numbering.meant(name, &present, problem)).flatten();
+                    let meant = || numbering.meant(name, &present, problem);
+                    let meant = (unknown.len() <= MAX_SUGGESTIONS).then(meant).flatten();
                     let is_typo = |meant: &&String| affects_results(meant) && one_typo(name, meant);
                     if let Some(meant) = meant.as_ref().filter(is_typo) {
                         let kind = TableErrorKind::MistypedColumn { meant: meant.clone() };

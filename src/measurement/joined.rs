@@ -1,16 +1,20 @@
 //! Join of a table of measured positions with a table of joint coordinates.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use super::appended::{JointRow, JointTableFormat};
-use super::clocks::{Rest, best_shift, clock_jump, moving_arm, nearest, rests};
+use super::clocks::{
+    ClockShift, Rest, best_shift, clock_jump, moving_arm, nearest, rests, rounded_up,
+    shifts_by_rows,
+};
 use super::headerless::{holds_numbers, no_header};
-use super::join_key::{Key, is_time, name_column, time_key};
+use super::instants::is_clock;
+use super::join_key::{Key, name_column, time_key};
 use super::mapped::Names;
 use super::meaning::is_numbered_or_position;
 use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
-use super::spelling::{quoted, same_but_for_spelling};
+use super::spelling::{misplaced, quoted, same_but_for_spelling, usual_difference};
 use super::table::{Table, shortened};
 use super::time::shown;
 use crate::error::{InputError, Location, TableErrorKind, Warning, WarningKind};
@@ -24,6 +28,9 @@ const MAX_LISTED_ROWS: usize = 10;
 const MAX_PLAUSIBLE_MEDIAN_GAP: f64 = 0.5;
 /// Smallest number of measured rows with which the pairing as a whole is checked.
 const MIN_CHECKED_ROWS: usize = 4;
+/// Number of measured rows of which one may have another partner with the clocks moved, before the
+/// pairing is refused.
+const MIN_ROWS_PER_ODD_PARTNER: usize = 20;
 
 /// Rows of the joint table, with the keys by which they are paired with measured rows.
 #[derive(Default)]
@@ -187,7 +194,7 @@ impl JoinedLog {
         let is_new = |place: &usize| {
             let (name, header) = (self.names.get(*place), self.header.get(*place));
             let is_key =
-                |name: &String| matches!(self.rule, JoinRule::Time { .. }) && is_time(name);
+                |name: &String| matches!(self.rule, JoinRule::Time { .. }) && is_clock(name);
             name.is_some_and(|name| !names.contains(name) && !is_key(name))
                 && header.is_some_and(|header| !table.header.contains(header))
         };
@@ -277,6 +284,14 @@ impl JoinedLog {
         Some(format!("{:.1} s", gaps.get(gaps.len() / 2)?))
     }
 
+    /// Returns the tolerance with which all measured rows have a partner, if it is at most twice that
+    /// of the problem.
+    fn sufficient_tolerance(&self) -> Option<String> {
+        let JoinRule::Time { tolerance, .. } = self.rule else { return None };
+        let most = self.gaps(true).last().copied()?;
+        (most <= 2.0 * tolerance).then(|| rounded_up(most))
+    }
+
     /// Returns the error that the tolerance is smaller than the usual time between partners. `None`
     /// unless nearly all rows without a partner are far nearer to a row of the log than its rows to
     /// each other, which other clocks would hardly give.
@@ -287,34 +302,45 @@ impl JoinedLog {
             self.log_times.iter().zip(self.log_times.iter().skip(1)).map(|(a, b)| b - a).collect();
         steps.sort_by(f64::total_cmp);
         let step = *steps.get(steps.len() / 2)?;
-        let digit = 10_f64.powf((2.0 * most).log10().floor());
-        let tolerance = (2.0 * most / digit - 1e-6).ceil() * digit;
         (gaps.len() >= MIN_CHECKED_ROWS && 10.0 * most < step).then(|| {
             TableErrorKind::ToleranceTooSmall {
                 left: self.unpaired.len(),
                 rows: self.requested,
                 gap: format!("{} s", two_digits(usual, 3)),
                 step: format!("{} s", two_digits(step, 3)),
-                tolerance: two_digits(tolerance, 6),
+                tolerance: rounded_up(2.0 * most),
             }
         })
     }
 
-    /// Returns the offset with which the rows of both tables pair best, as the value of `offset_s`;
-    /// `None` if the tables are not joined by time or no offset is certain. Paired rows are close to
-    /// each other, or within the tolerance of the problem if `is_tolerant`.
-    fn offset(&self, is_tolerant: bool) -> Option<String> {
-        self.shift_and_offset(is_tolerant).map(|(_, offset)| offset)
+    /// Returns the shift of the log with which the rows of both tables pair best, with the value of
+    /// `offset_s` that gives it, and the assignment of a larger tolerance if it needs one; `None` if
+    /// the tables are not joined by time or no shift is certain.
+    fn shift(&self) -> Option<(ClockShift, [String; 2])> {
+        let JoinRule::Time { offset, tolerance } = self.rule else { return None };
+        let shift = best_shift(&self.times, (&self.log_times, &self.rests))?;
+        let seconds = ((offset + shift.seconds) * 1e3).round() / 1e3;
+        let more = if shift.gap > tolerance {
+            format!(" and tolerance_s = {}", rounded_up(shift.gap))
+        } else {
+            String::new()
+        };
+        Some((shift, [format!("{seconds:?}"), more]))
     }
 
-    /// Returns the shift of the log \[s\] with which the rows pair best, and the offset as
-    /// [`offset`](Self::offset) does.
-    fn shift_and_offset(&self, is_tolerant: bool) -> Option<(f64, String)> {
-        let JoinRule::Time { offset, tolerance } = self.rule else { return None };
-        let tolerance = if is_tolerant { tolerance } else { 0.0 };
-        let shift = best_shift(&self.times, (&self.log_times, &self.rests), tolerance)?;
-        let seconds = ((offset + shift) * 1e3).round() / 1e3;
-        Some((shift, format!("{seconds:?}")))
+    /// Returns for each number of rows, by which positions may come after their configurations, the
+    /// value of `offset_s` that pairs them so \[s\].
+    pub fn offsets_by_rows(&self) -> Vec<(i8, f64)> {
+        let JoinRule::Time { offset, tolerance } = self.rule else { return Vec::new() };
+        let shifts = shifts_by_rows(&self.times, &self.log_times, tolerance);
+        shifts.into_iter().map(|(by, shift)| (by, offset + shift)).collect()
+    }
+
+    /// Returns true if a shift of the log gives more than the odd measured row another partner.
+    fn changes_partners(&self, shift: ClockShift) -> bool {
+        let partner = |time: f64| nearest(&self.log_times, time).map(|(row, _)| row);
+        let is_changed = |time: &&f64| partner(**time) != partner(**time - shift.seconds);
+        self.times.iter().filter(is_changed).count() > self.times.len() / MIN_ROWS_PER_ODD_PARTNER
     }
 
     /// Returns the row of the log that is the partner of most measured rows because its time is the
@@ -330,20 +356,21 @@ impl JoinedLog {
     /// # Errors
     /// Returns an error if no measured row has a partner, or if names or times show that most rows
     /// are paired wrongly or not at all. It also returns an error if most rows have the same,
-    /// distant partner, or if a joint table that is joined by order has two or more rows for each
-    /// measured row.
+    /// distant partner, or if tables that are joined by order differ in their numbers of rows.
     fn check_pairing(&self) -> Result<(), InputError> {
         let error = |kind: TableErrorKind| Err(self.location.clone().error(kind));
         let (left, rows, logged) = (self.unpaired.len(), self.requested, self.rows.len());
+        let shift = self.shift();
+        let offset = || shift.clone().map(|(_, offset)| offset);
         if 2 * left > rows
-            && let pairs = self.names_written_otherwise()
-            && let Some(&pair) = pairs.first()
-            && 2 * pairs.len() > self.unpaired_names.len()
+            && let Some((difference, pair)) =
+                usual_difference(&self.unpaired_names, self.unused_names())
         {
-            return error(TableErrorKind::NamesWrittenOtherwise { left, rows, pair: quoted(pair) });
+            let pair = quoted(pair);
+            return error(TableErrorKind::NamesWrittenOtherwise { left, rows, difference, pair });
         }
         if 2 * left > rows
-            && self.offset(false).is_none()
+            && shift.as_ref().is_none_or(|(shift, _)| shift.gap > MAX_PLAUSIBLE_MEDIAN_GAP)
             && let Some(table) = self.table_without_seconds()
         {
             return error(TableErrorKind::SecondsLost { table });
@@ -352,41 +379,41 @@ impl JoinedLog {
             return error(error_kind);
         }
         if self.paired == 0 && self.requested > 0 {
-            let (gap, keys, offset) = (self.gap(), self.keys(), self.offset(true));
+            let (gap, keys, offset) = (self.gap(), self.keys(), offset());
             return error(TableErrorKind::NothingJoined { gap, keys, offset });
+        }
+        if self.rule == JoinRule::Order && logged != rows {
+            return error(TableErrorKind::OtherRowsToPair { logged, rows });
         }
         if rows < MIN_CHECKED_ROWS {
             return Ok(());
         }
-        if self.rule == JoinRule::Order && logged >= 2 * rows {
-            return error(TableErrorKind::ManyRowsToPair { logged, rows });
-        }
-        if let Some(pair) = self.order_contradicted_by_names() {
+        if let Some(pair) = misplaced(&self.unlike_pairs, rows) {
             return error(TableErrorKind::OrderContradicted { pair: quoted(pair) });
         }
         if !matches!(self.rule, JoinRule::Time { .. }) {
             return Ok(());
         }
-        if 2 * left > rows
-            && let Some(offset) = self.offset(true)
-        {
-            let gap = self.gap();
-            return error(TableErrorKind::MostUnpaired { left, rows, gap, offset });
+        if 2 * left > rows {
+            let (gap, keys, offset) = (self.gap(), self.keys(), offset());
+            return error(TableErrorKind::MostUnpaired { left, rows, gap, keys, offset });
         }
         let gaps = self.gaps(false);
         let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
-        if let Some(row) = self.common_partner().filter(|_| usual > MAX_PLAUSIBLE_MEDIAN_GAP) {
+        if usual <= MAX_PLAUSIBLE_MEDIAN_GAP {
+            return Ok(());
+        }
+        if let Some(row) = self.common_partner() {
             let partner = Location::file(&row.source.file).at_line(row.source.line).to_string();
-            let (same, keys, offset) = (row.uses, self.keys(), self.offset(false));
+            let (same, keys, offset) = (row.uses, self.keys(), offset());
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
         }
-        let offset = if usual > MAX_PLAUSIBLE_MEDIAN_GAP { self.offset(false) } else { None };
-        match offset {
-            Some(offset) => {
+        match shift {
+            Some((shift, offset)) if self.changes_partners(shift) => {
                 let gap = format!("{usual:.1} s");
                 error(TableErrorKind::ClocksDiffer { gap, offset })
             }
-            None => Ok(()),
+            _ => Ok(()),
         }
     }
 
@@ -406,30 +433,11 @@ impl JoinedLog {
         }
     }
 
-    /// Returns the names of one pair that is joined by order, if the names of most measured rows
-    /// occur in the joint table at another row. Counters that begin at different numbers are no
-    /// names.
-    fn order_contradicted_by_names(&self) -> Option<[&str; 2]> {
-        let difference = |[name, other]: &[String; 2]| {
-            Some(name.parse::<i64>().ok()?.wrapping_sub(other.parse().ok()?))
-        };
-        let first = difference(self.unlike_pairs.first()?);
-        if first.is_some() && self.unlike_pairs.iter().all(|pair| difference(pair) == first) {
-            return None;
-        }
-        let of_log: HashSet<&str> =
-            self.unlike_pairs.iter().map(|[_, other]| other.as_str()).collect();
-        let misplaced = || self.unlike_pairs.iter().filter(|pair| of_log.contains(&*pair[0]));
-        let [name, other] = misplaced().next()?;
-        (2 * misplaced().count() > self.requested).then_some([name, other])
-    }
-
-    /// Returns the pairs of a measured name and a joint name without partners that differ only in
-    /// spelling.
-    fn names_written_otherwise(&self) -> Vec<[&str; 2]> {
+    /// Returns the names of the joint table that are no partner.
+    fn unused_names(&self) -> Vec<&str> {
         let is_unused = |row: usize| self.rows.get(row).is_some_and(|row| row.uses == 0);
         let names = self.of_name.iter().filter(|(_, row)| is_unused(**row));
-        same_but_for_spelling(&self.unpaired_names, names.map(|(name, _)| &**name).collect())
+        names.map(|(name, _)| &**name).collect()
     }
 
     /// Returns examples of the keys of both tables for a message: one name of each, or the ranges
@@ -462,21 +470,20 @@ impl JoinedLog {
     /// Returns an error if no row has a partner, or if the pairing as a whole is implausible.
     pub fn warnings(&self) -> Result<Vec<Warning>, InputError> {
         self.check_pairing()?;
-        let unused = self.rows.iter().filter(|row| row.uses == 0);
-        let unused: Vec<_> = match self.rule {
-            JoinRule::Time { .. } => Vec::new(),
-            _ => unused
-                .map(|row| Location::file(&row.source.file).at_line(row.source.line))
-                .collect(),
-        };
+        let is_unused = |row: &&LogRow| row.uses == 0 && self.rule == JoinRule::Name;
+        let unused = self.rows.iter().filter(is_unused);
+        let place = |row: &LogRow| Location::file(&row.source.file).at_line(row.source.line);
+        let unused: Vec<_> = unused.map(place).collect();
         // Measured rows are listed, because they are lost; unused joint rows are only counted.
-        let pairs = self.names_written_otherwise();
+        let pairs = same_but_for_spelling(&self.unpaired_names, self.unused_names());
         let alike = pairs.first().map(|&pair| (pairs.len(), quoted(pair)));
         let warning = |rows: &[Location], gap: Option<String>, listed: usize| {
             let others = rows.iter().skip(1).take(listed).map(ToString::to_string).collect();
             let alike = alike.clone().filter(|_| listed > 0);
-            let kind = WarningKind::WithoutPartner { rows: rows.len(), others, gap, alike };
-            Some(Warning { location: rows.first()?.clone(), kind })
+            let (location, tolerance) = (rows.first()?.clone(), self.sufficient_tolerance());
+            let rows = rows.len();
+            let kind = WarningKind::WithoutPartner { rows, others, gap, tolerance, alike };
+            Some(Warning { location, kind })
         };
         let unpaired =
             [warning(&self.unpaired, self.gap(), MAX_LISTED_ROWS), warning(&unused, None, 0)];
@@ -484,7 +491,7 @@ impl JoinedLog {
         let others = unpaired.into_iter().flatten();
         let others = others.chain(jump.or_else(|| order_contradicted(&self.timed_pairs)));
         let moving = (&*self.times, &*self.rests);
-        let shift = || self.shift_and_offset(true);
+        let shift = || self.shift().map(|(shift, [offset, _])| (shift.seconds, offset));
         let others = others.chain(moving_arm(moving, shift, &self.location));
         Ok(self.text_warnings.iter().cloned().chain(others).collect())
     }

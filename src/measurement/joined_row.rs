@@ -9,7 +9,8 @@ impl Table {
     /// Returns the format of the table as one whose columns are appended to another table.
     pub fn joint_table_format(&self) -> JointTableFormat {
         let header_place = (self.file.clone(), self.header_line);
-        JointTableFormat { style: self.style, date_order: self.date_order, header_place }
+        let (style, date_order, date_columns) = (self.style, self.date_order, self.date_columns);
+        JointTableFormat { style, date_order, date_columns, header_place }
     }
 
     /// Appends the columns with the indices `places` of a joint table to the header, under the

@@ -1,6 +1,6 @@
 //! Names of a table's columns after the map of `[data.columns]` has been applied.
 
-use super::join_key::is_time;
+use super::instants::is_clock;
 use super::meaning::{is_numbered_or_position, split_unit};
 use super::table::Table;
 use crate::error::{InputError, JOINED, TableErrorKind};
@@ -47,7 +47,10 @@ impl<'a> Names<'a> {
             ColumnSelector::File => rules.len() == 1,
         };
         if !rules.iter().any(|rule| is_foreign(&rule)) {
-            let unused = rules.iter().find(|rule| !has(&rule.ours));
+            // The clocks of a joint table may need rules of their own.
+            let is_of_clock =
+                |rule: &&ColumnRule| table.appended_columns().is_some() && is_clock(&rule.ours);
+            let unused = rules.iter().find(|rule| !has(&rule.ours) && !is_of_clock(rule));
             let unused = unused.filter(|rule| rule.theirs != ColumnSelector::File);
             return Ok(Self { of_place, of_file, mapped: false, unused });
         }
@@ -71,7 +74,7 @@ impl<'a> Names<'a> {
             };
             let Some(entry) = place.and_then(|place| of_place.get_mut(place)) else {
                 // The join has used the clock of the joint table, which stands in no row.
-                let is_clock = table.appended_columns().is_some() && is_time(&rule.ours);
+                let is_clock = table.appended_columns().is_some() && is_clock(&rule.ours);
                 if !measured || has(&rule.ours) || is_given_otherwise(rule) || is_clock {
                     continue;
                 }

@@ -27,6 +27,7 @@ mod duplicates;
 #[deny(clippy::indexing_slicing)]
 mod guessed_names;
 mod headerless;
+mod instants;
 #[deny(clippy::indexing_slicing)]
 mod join_key;
 mod joined;
@@ -155,6 +156,9 @@ pub struct Measurements {
     /// True if numbers of the first file have decimal commas, so that commands for it have them too.
     #[doc(hidden)]
     pub has_decimal_commas: bool,
+    /// Value of `offset_s` \[s\] that undoes a shift by so many rows, of tables joined by time.
+    #[doc(hidden)]
+    pub clock_offsets: Vec<(i8, f64)>,
     /// Columns of the commands in the first file, one per moving joint; empty without a file.
     #[doc(hidden)]
     pub command_columns: Vec<CommandColumn>,
@@ -279,8 +283,7 @@ impl Measurements {
         Location::file(&self.files[file as usize]).at_line(line as usize)
     }
 
-    /// Returns a copy of the conditions of a row; elapsed time counts from the first pose of the
-    /// session.
+    /// Returns a copy of the conditions of a row; time elapses from the first pose of its session.
     #[doc(hidden)]
     pub fn conditions(&self, row: usize) -> PoseConditions {
         self.setup(row, &self.session_starts()).to_owned()
@@ -445,6 +448,7 @@ impl Measurements {
                 .as_ref()
                 .map(|marked| rows.iter().map(|&row| marked[row]).collect()),
             has_decimal_commas: self.has_decimal_commas,
+            clock_offsets: self.clock_offsets.clone(),
             command_columns: self.command_columns.clone(),
             warnings: self.warnings.clone(),
             order: RowOrder::default(),

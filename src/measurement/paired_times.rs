@@ -27,7 +27,7 @@ pub(super) struct TimedPair {
 }
 
 /// Returns the median of some values, the upper one of two middle values; `None` without values.
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }

@@ -8,6 +8,7 @@ use super::limits::Commands;
 use super::observed;
 use super::role::{POINT, POSITION, Role};
 use super::rows::RowsBuilder;
+use super::settled::listed_together;
 use super::table::Table;
 use super::{ColumnTable, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
@@ -231,6 +232,7 @@ impl<'a> Tables<'a> {
         }
         columns.decide_time_column(&table, &mut ignored)?;
         columns.propose_times(&table, &mut ignored);
+        listed_together(&mut ignored);
         table.detach_row();
         self.warnings.append(&mut ignored);
         let rows = self
@@ -303,6 +305,7 @@ impl<'a> Tables<'a> {
                 if let Some(log) = &log {
                     warnings.extend(log.warnings()?);
                     measurements.files.extend(log.files());
+                    measurements.clock_offsets = log.offsets_by_rows();
                 }
                 measurements.require_moving_views(problem)?;
                 measurements.require_pixels(problem)?;

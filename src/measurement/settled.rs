@@ -1,11 +1,38 @@
-//! Decision by its first cell whether a column `time` contains dates.
+//! What the warnings about ignored columns say once the first row is known, and whether a column
+//! `time` contains dates.
 
 use super::columns::{Column, Columns};
 use super::role::Role;
 use super::table::{Table, shortened};
 use super::time::{assumed_month_first, is_ambiguous};
-use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
+use crate::error::{InputError, Location, TableErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
+
+/// Smallest number of ignored columns for which one warning lists all.
+const MIN_LISTED: usize = 4;
+/// Largest number of columns that it names.
+const MAX_NAMED: usize = 100;
+
+/// Replaces the warnings that columns are ignored without a similar known name by one for all of
+/// them, if there are many.
+pub(super) fn listed_together(ignored: &mut Vec<Warning>) {
+    let is_plain = |warning: &Warning| {
+        matches!(warning.kind, WarningKind::ColumnIgnored { meant: None, is_angle: false })
+    };
+    let plain: Vec<Warning> = ignored.iter().filter(|warning| is_plain(warning)).cloned().collect();
+    let name = |warning: &Warning| {
+        let key = warning.location.key.as_deref().unwrap_or_default();
+        key.strip_prefix("column ").unwrap_or(key).to_owned()
+    };
+    if let Some(first) = plain.first().filter(|_| plain.len() >= MIN_LISTED) {
+        let location = Location { key: None, ..first.location.clone() };
+        let names = plain.iter().take(MAX_NAMED).map(name).collect();
+        let more = plain.len().saturating_sub(MAX_NAMED);
+        ignored.retain(|warning| !is_plain(warning));
+        let kind = WarningKind::ColumnsIgnored { names, more };
+        ignored.push(Warning { location, kind });
+    }
+}
 
 impl Columns {
     /// Replaces the warnings that columns of dates are ignored by one that says how to read them as
@@ -41,10 +68,10 @@ impl Columns {
     ) -> Result<(), InputError> {
         let times = self.read.iter().find(|column| column.role == Role::Time);
         if let Some(place) = times.map(|column| column.place)
-            && let value = table.text(place)?
-            && let Some(read) = assumed_month_first(value, table.date_order(place))
+            && let value = table.instant(place)?
+            && let Some(read) = assumed_month_first(&value, table.date_order(place))
         {
-            let kind = WarningKind::MonthFirst { value: shortened(value), read };
+            let kind = WarningKind::MonthFirst { value: shortened(&value), read };
             warnings.push(Warning { location: table.column(table.name_of(place)), kind });
         }
         let has_times =
@@ -54,7 +81,7 @@ impl Columns {
         {
             let column = self.read.remove(place);
             let (theirs, value) =
-                (table.name_of(column.place), shortened(table.text(column.place)?));
+                (table.name_of(column.place), shortened(&table.instant(column.place)?));
             let is_number = value.is_empty() || table.number(column.place).is_ok();
             if is_ambiguous(&value, table.date_order(column.place)) {
                 return Err(table

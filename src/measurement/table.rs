@@ -15,7 +15,7 @@ use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
 use super::headerless::is_row_of_numbers;
 use super::latin::decoded_record;
 use super::lines::{Lines, MAX_RECORD_KIB};
-use super::time::{DateOrder, date_time, is_ambiguous};
+use super::time::DateOrder;
 use crate::error::{
     BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, TABLE, TableErrorKind,
     Warning, WarningKind, binary_format, is_hidden, lines, text_format, typographic,
@@ -53,6 +53,8 @@ pub(super) struct Table {
     starts_with_row: bool,
     /// Order of day and month in dates, by the first lines of the table.
     pub(super) date_order: DateOrder,
+    /// Columns of a date and of the time of day beside it; `None` without such columns.
+    pub(super) date_columns: Option<[usize; 2]>,
     /// Columns that a joint table appends to this table; `None` if it is not joined.
     pub(super) appended: Option<Appended>,
     /// Beginning of the text, in which the kinds of its numbers are looked up.
@@ -114,6 +116,7 @@ impl Table {
             },
             starts_with_row: false,
             date_order,
+            date_columns: None,
             appended: None,
             beginning: Beginning::new(start, layout, dialect.comment.clone()),
             decoded_line: None,
@@ -155,6 +158,7 @@ impl Table {
         } else if let Some(found) = table.other_format(dialect) {
             return Err(Location::file(file).at_line(table.line).error(other_format(found)));
         }
+        table.find_date_columns(dialect);
         if let [only] = table.header.as_slice()
             && let Some(found) = only.chars().find(|c| ";\t|".contains(*c))
         {
@@ -397,33 +401,6 @@ impl Table {
     fn is_unit_below_header(&self, word: &str) -> bool {
         let unit = word.trim_matches(['[', ']', '(', ')', ' ']);
         self.line == self.header_line + 1 && UNITS.contains(&unit)
-    }
-
-    /// Returns a cell of the current row as a time \[s\]: a number, converted by `to_si`, or a date
-    /// and time as seconds since 1970.
-    pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
-        let word = self.non_empty_text(place)?;
-        match date_time(word, self.date_order(place)) {
-            Some(seconds) => Ok(seconds),
-            None if is_ambiguous(word, self.date_order(place)) => {
-                Err(self
-                    .cell_error(place, TableErrorKind::AmbiguousDate { value: shortened(word) }))
-            }
-            None if word.bytes().filter(|byte| b"-:T".contains(byte)).count() > 1 => {
-                Err(self.cell_error(place, TableErrorKind::NotATime { value: shortened(word) }))
-            }
-            None => match self.number(place).map(to_si) {
-                Ok(seconds) if !seconds.is_finite() => {
-                    Err(self.cell_error(place, TableErrorKind::NotATime { value: shortened(word) }))
-                }
-                other => other,
-            },
-        }
-    }
-
-    /// Returns true if a cell of the current row is a date and time.
-    pub fn is_date(&self, place: usize) -> bool {
-        self.text(place).is_ok_and(|word| date_time(word, self.date_order(place)).is_some())
     }
 
     /// Returns the name in the header of the column with index `place`.

@@ -6,6 +6,8 @@ use std::fmt::Write as _;
 use super::document::{Block, Table};
 use super::render::text;
 use crate::fit::{ErrorSummary, Estimate, Identification, rows_of_kind};
+use crate::model::Model;
+use crate::model::parameter::{Parameter, ParameterSite};
 use crate::quantity::format::{counted, mm, number};
 use crate::results::{ExportResult, ExportedErrors, Origin, Summary};
 
@@ -29,6 +31,8 @@ pub struct ExportRemarks {
     /// Values of base and tool of a geometry that was fitted alone, as texts; `None` unless
     /// `--fitted-alone` was given.
     pub set_up: Option<Vec<String>>,
+    /// Values of base and tool of the estimate, as texts, for files that do not hold them.
+    pub found: Vec<String>,
     /// Lines of an exported table, its header first; empty for other files.
     pub table: Vec<Vec<String>>,
     /// Notes below that table.
@@ -73,6 +77,20 @@ pub fn kept_at_end(joint: &str) -> String {
     )
 }
 
+/// Returns the values of base and tool at the deviations `x` of all parameters, one text for each.
+pub fn set_up_at(model: &Model, x: &[f64]) -> Vec<String> {
+    let is_set_up = |parameter: &Parameter| {
+        matches!(parameter.site, ParameterSite::Base { .. } | ParameterSite::Target { .. })
+    };
+    let line = |(parameter, x): (&Parameter, &f64)| {
+        let unit = parameter.unit().display(parameter.nominal);
+        let value = number(parameter.value(*x) * unit.factor, 4);
+        format!("{} = {value} {}", parameter.name, unit.symbol)
+    };
+    let all = model.parameters.iter().zip(x);
+    all.filter(|(parameter, _)| is_set_up(parameter)).map(line).collect()
+}
+
 /// Returns the values of base and tool of a fit, one text for each parameter.
 fn set_up_values(found: &Identification) -> Vec<String> {
     let is_set_up = |estimate: &&Estimate| {
@@ -92,20 +110,32 @@ fn set_up_values(found: &Identification) -> Vec<String> {
 
 /// Words before the values of base and tool of a geometry that was fitted alone.
 const SET_UP_WORDS: &str = "Base and tool of this geometry, which replace those of the estimate";
+/// Words before those of the estimate.
+const FOUND_WORDS: &str = "As estimated, beside the table: base in the measuring frame, and measured \
+                           point (a controller's TCP) in the frame of the tool";
 
 /// Returns a comment for the end of an exported file with the values of base and tool that belong
 /// to a geometry fitted alone; empty for other geometries. The file is XML if `is_xml`, else YAML.
 pub fn set_up_comment(remarks: &ExportRemarks, is_xml: bool) -> String {
-    let Some(values) = remarks.set_up.as_ref().filter(|values| !values.is_empty()) else {
+    let (words, values) = set_up_lines(remarks);
+    if values.is_empty() {
         return String::new();
-    };
+    }
     if is_xml {
         // Two hyphens are not allowed in a comment.
         let values = values.join("; ").replace('-', "\u{2212}");
-        return format!("<!-- {SET_UP_WORDS}: {values} -->\n");
+        return format!("<!-- {words}: {values} -->\n");
     }
     let lines: String = values.iter().map(|value| ["#   ", value, "\n"].concat()).collect();
-    format!("# {SET_UP_WORDS}:\n{lines}")
+    format!("# {words}:\n{lines}")
+}
+
+/// Returns the values of base and tool that belong to the file, and the words before them.
+fn set_up_lines(remarks: &ExportRemarks) -> (&'static str, &[String]) {
+    match &remarks.set_up {
+        Some(values) => (SET_UP_WORDS, values),
+        None => (FOUND_WORDS, &remarks.found),
+    }
 }
 
 /// Returns the mean length of the errors, in the unit of the summary.
@@ -159,8 +189,9 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
         let words = "Parts of the model that the file cannot hold".to_owned();
         blocks.push(Block::Lines(words, result.not_held.clone()));
     }
-    if let Some(values) = remarks.set_up.as_ref().filter(|values| !values.is_empty()) {
-        blocks.push(Block::Lines(SET_UP_WORDS.to_owned(), values.clone()));
+    let (words, values) = set_up_lines(remarks);
+    if !values.is_empty() {
+        blocks.push(Block::Lines(words.to_owned(), values.to_vec()));
     }
     blocks.extend(result.file.iter().map(|file| Block::lines(format!("Written to {file}"))));
     text(&blocks)

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::shell::shell_word;
+use crate::problem::{Joint, Problem};
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM, names_of_joints};
 
 /// Describes the problem that was made from a URDF, with its `further` branches, and written to `folder`, and the next steps. If
@@ -59,6 +60,28 @@ pub fn init_text(
          temperature_C.\n\
          Next: flexcal check {word} --poses 40, then flexcal loop {word}\n",
         100.0 * HELD_OUT
+    );
+    words
+}
+
+/// Describes the problem that was completed from a typed table of joints and written to `folder`, and
+/// the next steps.
+pub fn sheet_text(problem: &Problem, description: &Description, folder: &Path) -> String {
+    let moving = problem.joints.iter().filter(|joint: &&Joint| joint.takes_command()).count();
+    let mut words = format!("{}: {moving} moving joints\n", description.name);
+    for note in &description.notes {
+        let _ = writeln!(words, "  note: {note}");
+    }
+    let (written, word) = (folder.join("problem.toml").display().to_string(), shell_word(folder));
+    let _ = write!(
+        words,
+        "\nWritten to {written}, with the parameters held that positions cannot tell from others. \
+         Fill in there\n  \
+         target_m           where the measured point sits behind the last row, roughly\n  \
+         position_sigma_mm  1 σ of a coordinate that your instrument measures; now {SIGMA_MM}\n  \
+         sigma_deg, _mm     in [parameters]: how far off the sheet may be\n  \
+         files              your table or tables\n\
+         Next: flexcal check {word} --poses 40, then flexcal loop {word}\n"
     );
     words
 }

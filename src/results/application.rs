@@ -139,6 +139,22 @@ impl CompensationResult {
 }
 
 impl InitResult {
+    /// Collects the result of completing a `problem` into `description`, which was written to `file`.
+    pub(crate) fn of_sheet(problem: &Problem, description: &Description, file: &Path) -> Self {
+        let joints = problem.joints.iter();
+        Self {
+            problem: description.name.clone(),
+            file: file.display().to_string(),
+            base: "base".to_owned(),
+            tip: problem.joints.last().map(|joint| joint.name.clone()).unwrap_or_default(),
+            joints: joints
+                .filter(|joint| joint.takes_command())
+                .map(|joint| joint.name.clone())
+                .collect(),
+            notes: description.notes.clone(),
+        }
+    }
+
     /// Collects the result of converting a chain, with the `further` ones of a tree, into
     /// `description`, which was written to `file`.
     pub fn new(chain: &Chain, further: &[Chain], description: &Description, file: &Path) -> Self {

@@ -15,7 +15,7 @@ use super::notes;
 use super::read::Kind;
 use crate::error::{InputError, UrdfErrorKind};
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
-use crate::problem::{Problem, quoted};
+use crate::problem::{Joint, Problem, quoted};
 use crate::spatial::Frame;
 
 /// Largest magnitude that counts as zero \[rad\] or \[m\]. Right angles written with eleven
@@ -34,7 +34,7 @@ const CONTINUOUS_RANGE: &str = "# A joint without limits: poses are planned with
      min_deg = -180\nmax_deg = 180\n";
 
 /// Section of the measured point, which the user fills in.
-const TOOL: &str = "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured \
+pub(super) const TOOL: &str = "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured \
                     point, in the frame of the tip\n";
 
 /// Problem made from a chain of a URDF.
@@ -408,6 +408,16 @@ fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String]) -> String {
          points_mm = [{}]\n",
         corners.join(", ")
     )
+}
+
+/// Returns the section `[parameters]` for the joints of a problem, of which those named in `free` are
+/// free.
+pub(super) fn parameters_of(problem: &Problem, free: &[String]) -> String {
+    let row = |joint: &Joint| {
+        let placement = joint.placement.as_ref().map(|_| Frame::identity());
+        Row { placement, ..Row::default() }
+    };
+    parameters(&problem.joints.iter().map(row).collect::<Vec<_>>(), free, false)
 }
 
 /// Returns the section `[parameters]`: priors for all parameters, and rules that fix those which

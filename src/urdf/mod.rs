@@ -20,6 +20,7 @@ mod notes;
 mod number;
 mod patches;
 mod read;
+mod sheet;
 mod yaml;
 
 pub(crate) use branch::Steps;
@@ -30,6 +31,7 @@ pub use describe::{Description, describe};
 pub use export::{Export, export};
 pub(crate) use patches::MovedOrigin;
 pub use read::Robot;
+pub(crate) use sheet::complete;
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{

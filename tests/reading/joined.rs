@@ -4,8 +4,9 @@ use flexcal::error::{InputError, Warning};
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
 
+use crate::common::arms::parse;
 use crate::common::program::{Folder, assert_contains};
-use crate::common::reading::{assert_says, words};
+use crate::common::reading::{assert_says, try_table, words};
 
 const ARM: &str = "name = 'arm'\n[[joint]]\n[[joint]]\na_m = 0.5\n";
 const TRACKER: &str = "// job\nPoint, X, Y, Z\nP1, 1000.5, 2.25, 3\nP2, 1100.5, 4.25, 6\n";
@@ -177,4 +178,161 @@ fn columns_of_a_table_without_a_header_are_selected_by_place() {
     let error = read("", "P1, 1000.5, 2.25, 3\nP2, 1100.5, 4.25, 6\n", LOG).unwrap_err();
     assert_says(&error, &["tracker.txt:1", "the first line holds numbers", "\"#1\" = \"pose\""]);
     assert!(!error.to_string().contains("\"P1\" ="), "{error}");
+}
+
+/// Times \[s\] of 40 stops of a log, with a row on the way to each, and of the readings of a tracker,
+/// which follow the stops by 2 to 3.5 s on another clock.
+fn stops() -> (Vec<f64>, Vec<f64>) {
+    let mut random = 1_u32;
+    let mut draw = |from: f64, to: f64| {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        from + (to - from) * f64::from(random >> 8) / f64::from(1_u32 << 24)
+    };
+    let (mut time, mut log, mut read) = (1000.0, Vec::new(), Vec::new());
+    for _ in 0..40 {
+        time += draw(6.0, 13.0);
+        log.push(time);
+        time += draw(6.0, 13.0);
+        log.push(time);
+        read.push(time + draw(2.0, 3.5) - 127.6);
+    }
+    (log, read)
+}
+
+/// Reads tables of the given times, joined by time with `more` in the braces.
+fn read_times(
+    more: &str,
+    log: &[f64],
+    measured: &[f64],
+) -> Result<(Measurements, Vec<Warning>), InputError> {
+    let text = format!(
+        "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['log.csv'], by = 'time'{more} }}\n"
+    );
+    let rows = |times: &[f64], more: &str| {
+        let row = |(k, time): (usize, &f64)| format!("{time:.1},{k},1{more}\n");
+        times.iter().enumerate().map(row).collect::<String>()
+    };
+    let tracker = format!("time_s,x_mm,y_mm,z_mm\n{}", rows(measured, ",2"));
+    let log = format!("time_s,q1_deg,q2_deg\n{}", rows(log, ""));
+    let folder =
+        Folder::with([("problem.toml", &*text), ("tracker.csv", &tracker), ("log.csv", &log)]);
+    let problem = Problem::read(&folder.path("problem.toml"))?;
+    Measurements::read(&problem.data.files, &problem)
+}
+
+#[test]
+fn the_offset_of_the_clocks_is_named_whatever_the_tolerance() {
+    let (log, measured) = stops();
+    for tolerance in [0.05, 0.2, 0.5, 1.2, 1.5, 2.0, 4.0, 5.0, 10.0, 60.0, 999.0] {
+        let more = format!(", tolerance_s = {tolerance}");
+        let error = read_times(&more, &log, &measured).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.contains("write offset_s = -124.") || said.contains("offset_s = -125."),
+            "{said}"
+        );
+        assert_eq!(said.contains(" and tolerance_s = "), tolerance < 0.9, "{said}");
+    }
+    let (rows, warnings) =
+        read_times(", offset_s = -124.8, tolerance_s = 1.1", &log, &measured).unwrap();
+    assert_eq!((rows.len(), words(&warnings)), (40, String::new()));
+    let (rows, warnings) =
+        read_times(", offset_s = -124.8, tolerance_s = 0.6", &log, &measured).unwrap();
+    assert!((30..40).contains(&rows.len()), "{}", rows.len());
+    assert_contains(&words(&warnings), &["; tolerance_s = 0.", " would pair them too"]);
+    // Readings that follow their stops by seconds on one clock are paired rightly.
+    let late: Vec<f64> = measured.iter().map(|time| time + 127.6).collect();
+    assert_eq!(read_times(", tolerance_s = 4", &log, &late).unwrap().0.len(), 40);
+}
+
+#[test]
+fn a_join_that_loses_most_rows_is_refused_and_one_at_equal_steps_knows_its_shifts() {
+    let every = |start: f64| (0..50).map(|k| f64::from(k) * 30.0 + start).collect::<Vec<f64>>();
+    let lost = read_times(", tolerance_s = 2", &every(0.0), &every(35.2)).unwrap_err();
+    assert_says(
+        &lost,
+        &["50 of 50 measured rows have no partner", "typically 5.2 s away", "no other offset"],
+    );
+    let rows = read_times(", tolerance_s = 40", &every(0.0), &every(35.2)).unwrap().0;
+    let before = rows.clock_offsets.iter().find(|(by, _)| *by == 1).unwrap().1;
+    assert!((before - 35.2).abs() < 1e-6, "{before}");
+}
+
+#[test]
+fn a_date_and_a_time_of_day_in_two_columns_are_one_instant() {
+    let tracker = |header: &str, day: &str| {
+        format!("{header}\n{day},23:59:50.5,1,2,3\n{day},23:59:58,4,5,6\n")
+    };
+    let read = |map: &str, tracker: &str, log: &str| {
+        let text = format!(
+            "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['log.csv'], by = 'time' }}\n{map}"
+        );
+        let folder =
+            Folder::with([("problem.toml", &*text), ("tracker.csv", tracker), ("log.csv", log)]);
+        let problem = Problem::read(&folder.path("problem.toml"))?;
+        Measurements::read(&problem.data.files, &problem)
+    };
+    let log = "Datum;Uhrzeit;q1_deg;q2_deg\n05.11.2026;23:59:50.5;1;2\n05.11.2026;23:59:58;3;4\n";
+    let other = log.replace("Datum;Uhrzeit", "Tag;Stunde");
+    let map = "[data.columns]\n'Tag' = 'date'\n'Stunde' = 'time'\n";
+    let times = "[data.columns]\n'Time' = 'time'\n'Uhrzeit' = 'time'\n";
+    for (map, header, day, log) in [
+        ("", "Date,Time,x_mm,y_mm,z_mm", "05.11.2026", log),
+        ("", "DATE,time,x_mm,y_mm,z_mm", "2026-11-05", log),
+        ("", "Datum,Zeit,x_mm,y_mm,z_mm", "2026-11-05 00:00:00", log),
+        (times, "Date,Time,x_mm,y_mm,z_mm", "05.11.2026", log),
+        (map, "Date,Time,x_mm,y_mm,z_mm", "05.11.2026", &*other),
+        (map, "Tag,Stunde,x_mm,y_mm,z_mm", "05.11.2026", &*other),
+    ] {
+        let (rows, warnings) = read(map, &tracker(header, day), log).unwrap();
+        assert_eq!((rows.len(), words(&warnings)), (2, String::new()), "{header}");
+        assert!(rows.has_dates() && (rows.time[1] - rows.time[0] - 7.5).abs() < 1e-6);
+    }
+    let ambiguous = read("", &tracker("Date,Time,x_mm,y_mm,z_mm", "05/11/2026"), log).unwrap_err();
+    assert_says(&ambiguous, &["05/11/2026 23:59:50.5", "either order"]);
+    let dateless = log.replace("Datum", "Day").replace("05.11.2026", "5");
+    let dateless = read("", &tracker("Date,Time,x_mm,y_mm,z_mm", "05.11.2026"), &dateless);
+    assert_says(&dateless.unwrap_err(), &["column time_s or time: missing"]);
+    let mapped = "[data.columns]\n'Stunde' = 'time'\n";
+    let alone = other.replace("Tag", "D");
+    let alone = read(mapped, &tracker("Date,Time,x_mm,y_mm,z_mm", "05.11.2026"), &alone);
+    assert_says(&alone.unwrap_err(), &["its date is missing", "\"…\" = \"date\""]);
+}
+
+#[test]
+fn names_and_numbers_of_rows_that_do_not_agree_are_refused_with_a_remedy() {
+    let tracker: String = (1..=8).map(|k| format!("pose_00{k}, {k}.5, 2.25, 3\n")).collect();
+    let tracker = format!("Point, X, Y, Z\n{tracker}");
+    let log: String = (1..=9).map(|k| format!("VIA{k};{k},5;1\nMP{k};{k},5;1\n")).collect();
+    let log = format!("Name;A1;A2\n{log}");
+    assert_says(
+        &read("", &tracker, &log).unwrap_err(),
+        &[
+            "8 of 8 measured rows have no partner of the same name",
+            "only in the letters about their number, as \"pose_001\" and \"MP1\"",
+        ],
+    );
+    let folder = Folder::with([
+        ("problem.toml", &*problem("").replace("by = 'name'", "by = 'order'")),
+        ("tracker.txt", &tracker),
+        ("log.csv", &log.replace("VIA", "Z").lines().take(11).collect::<Vec<_>>().join("\n")),
+    ]);
+    let problem = Problem::read(&folder.path("problem.toml")).unwrap();
+    assert_says(
+        &Measurements::read(&problem.data.files, &problem).unwrap_err(),
+        &["the joint table has 10 rows for 8 measured rows", "by = \"time\" or by = \"name\""],
+    );
+}
+
+#[test]
+fn many_unknown_columns_are_listed_in_one_warning() {
+    let names: Vec<String> = (1..=25).map(|k| format!("extra {k}")).collect();
+    let table =
+        format!("q1_deg,q2_deg,x_mm,y_mm,z_mm,{}\n1,2,3,4,5{}\n", names.join(","), ",7".repeat(25));
+    let (_, warnings) = try_table(&parse(ARM), &table).unwrap();
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert_contains(
+        &words(&warnings),
+        &["rows.csv:1: unknown columns; ignored", &names.join(", ")],
+    );
 }

@@ -14,3 +14,4 @@ mod formats;
 mod joined;
 mod limits;
 mod names;
+mod sheet;

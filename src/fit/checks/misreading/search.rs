@@ -283,11 +283,12 @@ impl<'a> Trial<'a> {
             // measured one. Shifts of rows are exempt, because they leave one row with a wrong
             // configuration.
             let is_shift = misreading.shifted_from().is_some();
+            let clocks = misreading.clock_hint(self.fitting.measurements);
             if !is_within_priors && !is_shift && rms > self.largest_usual_error() {
                 return None;
             }
             Some(Explanation {
-                words: misreading.described(size, self.problem) + &place,
+                words: misreading.described(size, self.problem) + &place + &clocks,
                 rms,
                 effect: size.and_then(|size| misreading.expressed(size)),
                 left_out: left_out?,

@@ -8,6 +8,7 @@ use super::commands::MILLIRADIANS;
 use super::search::MAX_NAMED;
 use super::{MassScale, Misreading, POSITION_UNITS, numbers_of, power_of_ten};
 use crate::error::Location;
+use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::fixture::carrier_word;
 use crate::problem::{Fixture, JointKind, Problem};
@@ -110,6 +111,19 @@ impl Misreading {
             },
             _ => self.to_string(),
         }
+    }
+
+    /// Returns a clause that names the offset of the clocks with which positions belong to the
+    /// configurations of their rows; empty unless tables are joined by time.
+    pub(super) fn clock_hint(self, table: &Measurements) -> String {
+        let Self::Shifted { by, from: 0 } = self else { return String::new() };
+        let offset = table.clock_offsets.iter().find(|(rows, _)| *rows == by);
+        offset.map_or_else(String::new, |(_, seconds)| {
+            format!(
+                " (joined by time: the clocks may differ; with offset_s = {seconds:.1} in joints they \
+                 belong to that of their own row)"
+            )
+        })
     }
 
     /// Describes exchanged lengths by the rows of the declared joint table; `None` for other

@@ -1,0 +1,63 @@
+//! Completion of a problem that declares an arm alone, typed from a data sheet.
+
+use std::fmt::Write as _;
+
+use toml_edit::DocumentMut;
+
+use super::describe::{Description, HELD_OUT, SIGMA_MM, TOOL, parameters_of};
+use super::free::distinguishable_parameters;
+use crate::error::InputError;
+use crate::problem::{JointKind, Problem};
+
+/// Completes the `text` of a problem by the sections of tool, parameters and data that it lacks:
+/// priors for all parameters, except those which positions cannot distinguish from others.
+///
+/// # Errors
+/// Returns an error if no model can be made of the arm.
+pub(crate) fn complete(problem: &Problem, text: &str) -> Result<Description, InputError> {
+    let document = text.parse::<DocumentMut>().ok();
+    let has = |key: &str| document.as_ref().is_some_and(|document| document.contains_key(key));
+    let mut notes = Vec::new();
+    let mut text = format!("{}\n", text.trim_end());
+    if !has("tool") && !has("target") {
+        text.push_str(TOOL);
+    }
+    if has("parameters") {
+        notes.push("[parameters] is kept as it was".to_owned());
+    } else if problem.is_chain() {
+        let _ = write!(
+            text,
+            "\n{}",
+            parameters_of(problem, &distinguishable_parameters(problem, false)?)
+        );
+    } else {
+        notes.push("the joints are a tree, so [parameters] is left to write".to_owned());
+    }
+    if has("data") {
+        notes.push("[data] is kept as it was".to_owned());
+    } else {
+        let _ = write!(text, "\n{}", data(problem));
+    }
+    Ok(Description { name: problem.name.clone(), text, notes })
+}
+
+/// Returns the section `[data]`, with the names of the columns and what other tables need as
+/// comments.
+fn data(problem: &Problem) -> String {
+    let unit = |kind| if kind == JointKind::Prismatic { "mm" } else { "deg" };
+    let joints = (1..).zip(&problem.joints).filter(|(_, joint)| joint.takes_command());
+    let columns: Vec<String> =
+        joints.map(|(number, joint)| format!("q{number}_{}", unit(joint.kind))).collect();
+    format!(
+        "# Columns of the measurements:\n#   {}, x_mm, y_mm, z_mm\n\
+         [data]\nfiles = [\"measurements.csv\"]\n\
+         # joints = {{ files = [\"controller.csv\"], by = \"time\" }}   # if another table holds the joints; or \"name\", \"order\"\n\
+         position_sigma_mm = {SIGMA_MM}                         # 1 σ of a measured coordinate: put in that of your instrument\n\
+         held_out = {{ fraction = {HELD_OUT}, seed = 1 }}          # poses that judge and are not fitted\n\n\
+         # [data.columns]                                 # theirs = ours, where the names in the tables differ\n\
+         # \"X\" = \"x_mm\"\n\
+         # [data.format]\n\
+         # decimal = \",\"                                  # where numbers have decimal commas\n",
+        columns.join(", ")
+    )
+}
