@@ -81,6 +81,16 @@ pub fn warn(message: &str) {
     show(Level::WARNING, message, None);
 }
 
+/// Prints that the command ends early, below its line of progress on a terminal.
+pub fn interrupted(message: &str) {
+    let mut terminal = std::io::stderr();
+    if terminal.is_terminal() {
+        // If this cannot be written, the message cannot either.
+        let _ = writeln!(terminal);
+    }
+    show(Level::ERROR, message, None);
+}
+
 /// Prints the warnings of a fit and returns the outcome of the command that made it. If `quiet`,
 /// prints only the reason why the fit is not trusted.
 pub fn report_fit(fit: &Identification, quiet: bool) -> Outcome {

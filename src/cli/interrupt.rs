@@ -93,10 +93,17 @@ fn install() -> Stop {
     stop_request().clone()
 }
 
-/// Makes requests to end (SIGTERM) act as interrupts do. Must be called before other threads start:
-/// they inherit the blocked signal and leave it to the thread that waits for it.
+/// Handles interrupts, and requests to end (SIGTERM) in the same way. Must be called before other
+/// threads start: they inherit the blocked signal and leave it to the thread that waits for it.
+pub fn watch() {
+    install();
+    #[cfg(unix)]
+    watch_termination();
+}
+
+/// Makes requests to end (SIGTERM) act as interrupts do.
 #[cfg(unix)]
-pub fn watch_termination() {
+fn watch_termination() {
     use nix::sys::signal::{SigSet, Signal};
     static WATCHED: Once = Once::new();
     WATCHED.call_once(|| {
@@ -116,10 +123,6 @@ pub fn watch_termination() {
     });
 }
 
-/// Does nothing on systems without SIGTERM.
-#[cfg(not(unix))]
-pub fn watch_termination() {}
-
 /// Makes the stop request, and gives a command that heeds it a limited time to end. Ends the
 /// process at once for other commands, and at the second interrupt. Waits while files get their
 /// final names.
@@ -127,6 +130,7 @@ fn end_early(status: u8) {
     let is_repeated = stop_request().request();
     if is_repeated || !HEEDS_STOP_REQUEST.load(Ordering::Relaxed) {
         let _files = lock(&WRITE_LOCK);
+        super::diagnostic::interrupted("interrupted before the end");
         exit(i32::from(status));
     }
     if thread::Builder::new().spawn(end_in_time).is_err() {
@@ -149,7 +153,7 @@ fn end_in_time() {
     };
     let status = work.map_or_else(
         || {
-            super::diagnostic::warn("interrupted before there was a result");
+            super::diagnostic::interrupted("interrupted before there was a result");
             INTERRUPTED_STATUS
         },
         |work| work(),

@@ -101,7 +101,9 @@ impl LoopRecord {
     pub fn write(self) -> u8 {
         let added = self.added.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if added.is_empty() {
-            diagnostic::warn("interrupted before the first round was done: nothing is written");
+            diagnostic::interrupted(
+                "interrupted before the first round was done: nothing is written",
+            );
             return interrupt::INTERRUPTED_STATUS;
         }
         match self.write_closed_problem(&added) {

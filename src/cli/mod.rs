@@ -127,7 +127,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     flexcal::report::limit_text_width(output::terminal_columns());
-    interrupt::watch_termination();
+    interrupt::watch();
     if let Err(error) = threads::check() {
         diagnostic::print(&error);
         return 2;

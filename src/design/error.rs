@@ -55,6 +55,12 @@ pub enum DesignError {
          masses"
     )]
     NoEquilibrium,
+    /// Every candidate of a table is measured and fitted already.
+    #[error(
+        "all candidates are measured and fitted already; give a table with others, or none to \
+         draw them from the ranges of the joints"
+    )]
+    AllMeasured,
     /// The target of the nominal arm is in no candidate inside the region.
     #[error("in no pose is the target inside the region{}", of_size(*.millimetres))]
     NothingInRegion {

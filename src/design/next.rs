@@ -243,7 +243,7 @@ pub fn next(
     let mut site = Site::with_cameras(&designed, &[&measured], pairs)?;
     site.linearise_at(&found, &measured);
     let Pool { candidates: pool, workspace: reference, drawn } =
-        pool_and_workspace(candidates, &site, &measured, (options.workspace, poses, seed));
+        pool_and_workspace(candidates, &site, &measured, (options.workspace, poses, seed))?;
     if let Some(region) = options.workspace.filter(|_| pool.is_empty()) {
         return Err(DesignError::nothing_in(region).into());
     }

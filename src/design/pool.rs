@@ -1,6 +1,6 @@
 //! Candidates for the next poses, and the workspace over which their predictions are judged.
 
-use super::{Candidates, Extremes, Site, Workspace};
+use super::{Candidates, DesignError, Extremes, Site, Workspace};
 use crate::measurement::Measurements;
 
 /// Number of candidates drawn from ranges: uniformly, and with emphasis on the limits.
@@ -20,13 +20,13 @@ pub(super) struct Pool {
 }
 
 /// Returns the candidates that have not been measured yet, and the poses of the workspace, over
-/// which predictions are averaged.
+/// which predictions are averaged; an error if all candidates of a table are measured.
 pub(super) fn pool_and_workspace(
     candidates: &Candidates,
     site: &Site,
     measured: &Measurements,
     (workspace, poses, seed): (Option<&Workspace>, usize, u64),
-) -> Pool {
+) -> Result<Pool, DesignError> {
     let inside = |table: Measurements| match workspace {
         Some(workspace) => table.select(&site.inside(&table, workspace)),
         None => table,
@@ -37,7 +37,10 @@ pub(super) fn pool_and_workspace(
             let step = rows.len().div_ceil(WORKSPACE_POSES).max(1);
             let some: Vec<usize> = (0..rows.len()).step_by(step).collect();
             let candidates = rows.select(&unmeasured(&rows, measured));
-            Pool { candidates, workspace: rows.select(&some), drawn: None }
+            if candidates.is_empty() && !rows.is_empty() {
+                return Err(DesignError::AllMeasured);
+            }
+            Ok(Pool { candidates, workspace: rows.select(&some), drawn: None })
         }
         Candidates::Within(ranges) => {
             let drawn = |count: usize, extremes, stream| {
@@ -48,11 +51,11 @@ pub(super) fn pool_and_workspace(
             let [uniform, often] = DRAWN_CANDIDATES.map(|count| count.max(poses));
             let (pool, count) = drawn(uniform, Extremes::No, 0);
             let (extremes, more) = drawn(often, Extremes::Often, 1);
-            Pool {
+            Ok(Pool {
                 candidates: pool.concatenate(&extremes),
                 workspace: drawn(WORKSPACE_POSES, Extremes::No, 2).0,
                 drawn: site.is_of_cameras(&pool).then_some(count + more),
-            }
+            })
         }
     }
 }

@@ -145,20 +145,20 @@ pub(super) fn command_table(problem: &Problem, poses: &Measurements) -> Table {
     let rows = (0..poses.len()).map(|pose| {
         let q = poses.configuration(pose);
         let value = |joint: &CommandedJoint| {
-            let command = q.get(joint.joint).copied().unwrap_or(f64::NAN) * joint.factor();
-            let space = if joint.symbol() == "°" { "" } else { " " };
-            format!("{} {}{space}{}", joint.name(), number(command, 2), joint.symbol())
+            number(q.get(joint.joint).copied().unwrap_or(f64::NAN) * joint.factor(), 2)
         };
-        let commands: Vec<String> = joints.iter().map(value).collect();
-        let mut cells = vec![(pose + 1).to_string(), commands.join(", ")];
-        if !others.is_empty() {
-            let other = |(name, cells): &&(String, Vec<String>)| format!("{name} {}", cells[pose]);
-            cells.push(others.iter().map(other).collect::<Vec<_>>().join(", "));
-        }
-        cells
+        let other = others.iter().map(|(_, cells)| cells[pose].clone());
+        let commands = joints.iter().map(value);
+        std::iter::once((pose + 1).to_string()).chain(commands).chain(other).collect()
     });
-    let header = &["pose", "commands", "other columns"][..2 + usize::from(!others.is_empty())];
-    Table::new(header, rows.collect(), &[1, 2])
+    let joint_names = joints.iter().map(|joint| format!("{}, {}", joint.name(), joint.symbol()));
+    let names = others.iter().map(|(name, _)| name.clone());
+    let header = std::iter::once("pose".to_owned()).chain(joint_names).chain(names);
+    // Columns of words, such as the session.
+    let is_words = |cells: &[String]| cells.iter().any(|cell| cell.parse::<f64>().is_err());
+    let words = (0..others.len()).filter(|&k| is_words(&others[k].1));
+    let left = words.map(|k| 1 + joints.len() + k).collect();
+    Table { header: header.collect(), rows: rows.collect(), left, ..Table::default() }
 }
 
 /// States whether enough poses are measured, or after how many more there are expected to be

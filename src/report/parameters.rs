@@ -1,6 +1,6 @@
 //! Parameters in words: table of estimates, unidentifiable and weak combinations, correlations.
 
-use super::document::{Bar, Block, Table, first_of};
+use super::document::{Bar, Block, Table, code, first_of};
 use super::figures::{ACCENT, Drawing, Forest};
 use crate::fit::{ActiveConstraint, Estimate, Identification, PriorSize, open_quantities};
 use crate::least_squares::solver::AtBound;
@@ -118,9 +118,11 @@ pub(super) fn joint_names(problem: &Problem, words: &str) -> Option<String> {
 pub(super) fn rows_of_sheet(problem: &Problem) -> Option<String> {
     let flange = problem.standard_rows()?.len() + 1;
     Some(format!(
-        "standard DH: θ and d of row i of the sheet are joint(i).theta and joint(i).d; its a and α are joint(i+1).a and \
-         joint(i+1).alpha, so that joint{flange}, the flange, has those of row {}",
-        flange - 1
+        "standard DH: θ and d of row i of the sheet are joint(i).theta and joint(i).d; its a and α \
+         are joint(i+1).a and joint(i+1).alpha, so that joint{flange}, the flange, has those of \
+         row {}; {} writes the table of the sheet",
+        flange - 1,
+        code("flexcal export --format dh")
     ))
 }
 

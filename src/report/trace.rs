@@ -313,6 +313,12 @@ pub(super) fn ranking<'a>(
              probabilities take this into account.",
         );
     }
+    if shown.iter().any(|candidate| candidate.alike.len() > MAX_SHOWN_CONFOUNDED) {
+        let _ = write!(
+            notes,
+            " An entry names at most {MAX_SHOWN_CONFOUNDED} similar effects; {where_all}."
+        );
+    }
     if shown.iter().any(|candidate| separating_pose(candidate, noise).is_some()) {
         notes.push_str(" The pose to measure is within the measured ranges.");
     }

@@ -68,8 +68,28 @@ impl Terminal {
         self.signal("INT");
     }
 
+    /// Returns the process id of the command, once it has been shown.
+    fn pid(&self) -> &str {
+        self.shown.split_once("pid=").unwrap().1.split('.').next().unwrap()
+    }
+
+    /// Waits until the command handles interrupts.
+    #[cfg(target_os = "linux")]
+    fn wait_for_handler(&mut self) {
+        self.wait_for(".");
+        let is_handled = || {
+            let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap();
+            let value = |key| status.split_once(key).unwrap().1.lines().next().unwrap().trim();
+            let caught = u64::from_str_radix(value("SigCgt:"), 16).unwrap();
+            value("Name:") == "flexcal" && caught & 2 != 0
+        };
+        while !is_handled() {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+    }
+
     fn signal(&self, signal: &str) {
-        let pid = self.shown.split_once("pid=").unwrap().1.split('.').next().unwrap();
+        let pid = self.pid();
         assert!(
             Command::new("sh")
                 .args(["-c", &format!("kill -{signal} {pid}")])
@@ -146,6 +166,21 @@ fn an_interrupted_loop_replaces_no_finished_one() {
         let found = folder.read("out/interrupted/problem.closed.toml");
         assert!(found.contains("link-thermal-bending"), "{found}");
         assert!(shown.contains("holds a finished loop, which stays"), "{shown}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn every_command_says_that_it_was_interrupted() {
+    let folder = measured();
+    for command in ["plan . --poses 200", "simulate . --truth TRUTH.toml --poses 1000000"] {
+        let mut run = Terminal::run(&folder.path(""), &format!("{command} --out early"));
+        run.wait_for_handler();
+        run.interrupt();
+        let (status, shown) = run.end();
+        assert_eq!(status, Some(130), "{command}: {shown}");
+        assert_contains(&shown, &["error", "interrupted before the end"]);
+        assert!(!folder.has("early"));
     }
 }
 

@@ -143,6 +143,13 @@ fn poses_for_causes_tell_open_effects_apart() {
 }
 
 #[test]
+fn a_pool_of_measured_poses_alone_is_refused_in_words() {
+    let folder = measured(12);
+    let refused = next(&folder, "--pool arm/measurements.csv");
+    assert_contains(&refused.stderr, &["all candidates are measured and fitted already"]);
+}
+
+#[test]
 fn requests_that_are_too_large_are_refused_in_words() {
     let folder = measured(12);
     let refused = next(&folder, "--poses 10000");

@@ -13,7 +13,7 @@ pub const LEFT_SPACE: f64 = 62.0;
 pub const RIGHT_SPACE: f64 = 12.0;
 /// Space above a panel's plot area in displayed pixels.
 const SPACE_ABOVE: f64 = 8.0;
-/// Height of the legend in displayed pixels.
+/// Height of a line of the legend in displayed pixels.
 const LEGEND_HEIGHT: f64 = 20.0;
 /// Space between the names of rows and the plot area, and around the names, in displayed pixels.
 const NAME_GAP: f64 = 10.0;
@@ -233,17 +233,22 @@ pub fn chart(label: &str, legend: &[Entry], panels: &[Panel]) -> String {
     let mut top = if legend.is_empty() { 0.0 } else { LEGEND_HEIGHT };
     let mut at = LEFT_SPACE;
     for &(name, colour, mark) in legend {
-        let square = [(at, 6.0), (at + 8.0, 14.0)];
         let width = if let Mark::Scale(length) = mark { length } else { 8.0 };
+        // An entry that does not fit begins another line.
+        if at > LEFT_SPACE && at + width + 5.0 + text_width(name) > FIGURE_WIDTH {
+            (at, top) = (LEFT_SPACE, top + LEGEND_HEIGHT);
+        }
+        let y = top - 0.5 * LEGEND_HEIGHT;
+        let square = [(at, y - 4.0), (at + 8.0, y + 4.0)];
         match mark {
-            Mark::Dot => svg.circle((at + 4.0, 10.0), 3.2, Paint::fill(colour), ""),
-            Mark::Ring => svg.circle((at + 4.0, 10.0), 3.2, Paint::line(colour, 1.2), ""),
-            Mark::Line => svg.line([(at - 2.0, 10.0), (at + 9.0, 10.0)], Paint::line(colour, 2.2)),
-            Mark::Scale(_) => svg.line([(at, 10.0), (at + width, 10.0)], Paint::line(colour, 1.6)),
+            Mark::Dot => svg.circle((at + 4.0, y), 3.2, Paint::fill(colour), ""),
+            Mark::Ring => svg.circle((at + 4.0, y), 3.2, Paint::line(colour, 1.2), ""),
+            Mark::Line => svg.line([(at - 2.0, y), (at + 9.0, y)], Paint::line(colour, 2.2)),
+            Mark::Scale(_) => svg.line([(at, y), (at + width, y)], Paint::line(colour, 1.6)),
             Mark::Bar => svg.rectangle(square, Paint::fill(colour), ""),
             Mark::Band => svg.rectangle(square, Paint::fill(colour).faded(BAND_OPACITY), ""),
         }
-        svg.text(name, (at + width + 5.0, 10.0), (MUTED, TEXT_SIZE), Anchor::Start);
+        svg.text(name, (at + width + 5.0, y), (MUTED, TEXT_SIZE), Anchor::Start);
         at += width + 19.0 + 6.0 * name.chars().count() as f64;
     }
     for panel in panels {

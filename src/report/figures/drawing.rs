@@ -1,7 +1,7 @@
 //! Figure with its title, caption and CSV data, and the sentences that captions share.
 
 use crate::files::csv;
-use crate::quantity::format::fixed;
+use crate::quantity::format::{fixed, two_digits};
 use crate::results::PoseError;
 
 /// Figure of a report: title, caption, drawing and plotted data.
@@ -79,4 +79,19 @@ pub fn beyond_note(count: usize) -> String {
         1 => " One value lies beyond the axes: a ring at the rim.".to_owned(),
         n => format!(" {n} values lie beyond the axes: rings at the rim."),
     }
+}
+
+/// Returns the opacity of each length on a colour scale from `least` to `most` \[m\], and the words
+/// of a caption on the scale; `beyond` follows its upper end. If both ends are the same in two
+/// digits, all lengths have one opacity.
+pub fn shades((least, most): (f64, f64), beyond: &str) -> (impl Fn(f64) -> f64 + Copy, String) {
+    let [pale, deep] = [least, most].map(|length| two_digits(length * 1e3, 4));
+    let is_even = pale == deep;
+    let words = if is_even {
+        format!("about {pale} mm{beyond} throughout")
+    } else {
+        format!("pale {pale} mm, deep {deep} mm{beyond}")
+    };
+    let share = move |length: f64| ((length - least) / (most - least)).min(1.0);
+    (move |length| if is_even { 0.5 } else { 0.08 + 0.92 * share(length) }, words)
 }

@@ -55,9 +55,7 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     if least > most {
         return None;
     }
-    let shade = |value: f64| {
-        if most > least { 0.08 + 0.92 * (value - least) / (most - least) } else { 0.5 }
-    };
+    let (shade, scale) = shades((least, most), "");
     let end = |command: CommandedJoint, value: f64| {
         let (symbol, value) = (command.symbol(), number(value * command.factor(), 0));
         let space = if symbol == "°" { "" } else { " " };
@@ -88,10 +86,8 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
         .with(shapes);
     let caption = format!(
         "Root mean square residual over the poses in which a joint is in one twelfth of its \
-         measured range: pale {} mm, deep {} mm; an empty box has no pose. A change along a row \
+         measured range: {scale}; an empty box has no pose. A change along a row \
          may come from an error of that joint, or from whatever varies with it over these poses.",
-        two_digits(least * 1e3, 4),
-        two_digits(most * 1e3, 4)
     );
     let rows = joints.iter().flat_map(|(command, ranges)| {
         ranges.iter().map(|part| {

@@ -43,10 +43,8 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     // A few cells far from all poses would leave the others without contrast.
     let deepest = sorted.len() - 1 - sorted.len() / CELLS_PER_SATURATED;
     let (least, most) = (sorted[0], sorted[deepest]);
-    let shade = |bound: f64| {
-        let share = if most > least { ((bound - least) / (most - least)).min(1.0) } else { 0.5 };
-        Paint::fill(WARM).faded(0.08 + 0.92 * share)
-    };
+    let (opacity, scale) = shades((least, most), " or more");
+    let shade = |bound: f64| Paint::fill(WARM).faded(opacity(bound));
     let panels = views.iter().zip(&cells).map(|(&(axis, label, below), cells)| {
         // The upper edge is that of the highest cell.
         let height = (size(axis) / cell).ceil() * cell;
@@ -71,12 +69,8 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     };
     let caption = format!(
         "{level} % bound of the error (measured − predicted), averaged over the configurations \
-         whose \
-         target lies in each cell, in the frame of the arm's base: pale {} mm, deep {} mm or \
-         more. Of {} random \
+         whose target lies in each cell, in the frame of the arm's base: {scale}. Of {} random \
          configurations within the measured range of each joint, {beyond}.",
-        two_digits(least * 1e3, 4),
-        two_digits(most * 1e3, 4),
         bounds.len(),
     );
     let rows = bounds.iter().map(|at| {

@@ -1,5 +1,7 @@
 //! Figure of the residual vectors over the workspace.
 
+use std::collections::BTreeSet;
+
 use super::chart::{LEFT_SPACE, RIGHT_SPACE};
 use super::prelude::*;
 
@@ -39,6 +41,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
     // The scale bar is 1, 2 or 5 times a power of ten.
     let bar = round_down(large);
     let magnification = VECTOR_LENGTH * (across.1 - across.0) / bar;
+    let mut cut = BTreeSet::new();
     let view = |(axis, label, below): (usize, &str, &str)| {
         let height = (size(axis) / per_pixel).max(HEIGHT_RANGE.0).round();
         let up = centred(extent(axis), height * per_pixel);
@@ -48,6 +51,9 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
             let shift = (magnification * pose.error.x, magnification * pose.error[axis]);
             // A line that would leave the view ends at its edge.
             let part = share_inside(from.0, shift.0, across).min(share_inside(from.1, shift.1, up));
+            if part < 1.0 {
+                cut.insert(row);
+            }
             let to = (from.0 + part * shift.0, from.1 + part * shift.1);
             let line = Shape::line([from, to], Paint::line(colour, 1.2));
             [line, Shape::dot(from, 1.5, Paint::fill(colour), Some(row))]
@@ -56,6 +62,12 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
             .with(shown.iter().zip(&rows).flat_map(vector))
     };
     let views = [(1, "y [m]", "x [m], seen from above"), (2, "z [m]", "x [m], seen from the side")];
+    let views = views.map(view);
+    let cut = match cut.len() {
+        0 => String::new(),
+        1 => " 1 line is longer than shown: it ends at the frame.".to_owned(),
+        count => format!(" {count} lines are longer than shown: they end at the frame."),
+    };
     let scale = format!("{} mm", two_significant(bar * 1e3));
     let mut legend = poses_legend();
     legend.push((&scale, INK, Mark::Scale(VECTOR_LENGTH * width)));
@@ -63,7 +75,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
         "Each line starts at a measured position (dot) and shows the residual measured − \
          predicted there, magnified {} times: from above (x, y) and from the side (x, z) of the \
          measuring frame. Similar directions of neighbours are structure; random directions are \
-         noise.{}{}",
+         noise.{cut}{}{}",
         two_significant(magnification),
         omission_note(positions().count() - count),
         thinning_note(shown.len(), count)
@@ -75,7 +87,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
     Some(Drawing::new(
         ("residual-vectors", "Residuals over the workspace"),
         caption,
-        chart("Residual vectors from above and from the side", &legend, &views.map(view)),
+        chart("Residual vectors from above and from the side", &legend, &views),
         pose_sheet(&columns, cells),
     ))
 }

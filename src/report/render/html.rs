@@ -193,7 +193,7 @@ fn block<'a>(item: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
     }
 }
 
-/// Renders text with its code spans.
+/// Renders text with its code spans. Words of code with hyphens are not broken there.
 fn words(text: &str) -> Markup {
     let mut parts = Vec::new();
     for (k, part) in text.split(CODE.0).enumerate() {
@@ -202,8 +202,36 @@ fn words(text: &str) -> Markup {
         parts.push([code, plain]);
     }
     html! {
-        @for [code, plain] in &parts { @if !code.is_empty() { code { (code) } } (plain) }
+        @for [code, plain] in &parts { @if !code.is_empty() { (unbroken(code)) } (with_signs(plain)) }
     }
+}
+
+/// Renders code; its words of moderate length are not broken at hyphens.
+fn unbroken(code: &str) -> Markup {
+    let is_kept = |word: &str| word.contains('-') && word.chars().count() <= MAX_UNBROKEN_WORD;
+    html! {
+        code {
+            @for (k, word) in code.split(' ').enumerate() {
+                @if k > 0 { " " }
+                @if is_kept(word) { span.w { (word) } } @else { (word) }
+            }
+        }
+    }
+}
+
+/// Returns a sentence in which negative numbers have a minus sign and stay beside the word before.
+fn with_signs(sentence: &str) -> String {
+    let mut signed = String::with_capacity(sentence.len());
+    for (k, word) in sentence.split(' ').enumerate() {
+        let is_number = |rest: &&str| rest.starts_with(|letter: char| letter.is_ascii_digit());
+        match (k, word.strip_prefix('-').filter(is_number)) {
+            (0, Some(number)) if sentence.len() > word.len() => signed.extend(["−", number]),
+            (0, _) => signed.push_str(word),
+            (_, None) => signed.extend([" ", word]),
+            (_, Some(number)) => signed.extend(["\u{a0}−", number]),
+        }
+    }
+    signed
 }
 
 /// Removes control characters (except line breaks) and other invisible characters.
@@ -256,9 +284,11 @@ fn table(table: &Table) -> Markup {
     let classes = |k: usize, text: &str| {
         let is_long = text.split_whitespace().any(|word| word.chars().count() > MAX_UNBROKEN_WORD);
         let is_sentence = text.chars().count() > MAX_UNBROKEN_CELL;
+        let is_short = text.chars().count() <= MAX_UNBROKEN_WORD && text.contains(' ');
         match class(k) {
             Some(class) if is_long => Some(format!("{class} long")),
             Some(class) if is_sentence => Some(format!("{class} text")),
+            Some(class) if is_short && k > 0 => Some(format!("{class} s")),
             class => class.map(str::to_owned),
         }
     };
@@ -342,4 +372,20 @@ fn grid<'a>(new: &'a [Drawing], shown: &mut Vec<&'a Drawing>) -> Markup {
     };
     shown.extend(new);
     grid
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn negative_numbers_in_sentences_have_a_minus_sign() {
+        let poses = "measure at q1 -47.2°, q2 5.0°";
+        assert_eq!(with_signs(poses), "measure at q1\u{a0}−47.2°, q2 5.0°");
+        let range = "-0.24 mm, -0.29 to -0.19";
+        assert_eq!(with_signs(range), "−0.24 mm,\u{a0}−0.29 to\u{a0}−0.19");
+        for name in ["2025-03-18 --poses 3", " out-of-range", "-5"] {
+            assert_eq!(with_signs(name), name);
+        }
+    }
 }

@@ -64,8 +64,9 @@
     for (const corner of [[0, -1], [0, 1], [1, -1], [1, -1], [0, 1], [1, 1]]) numbers.push(...a, ...b, ...ga, ...gb, ...corner, ...colour, width);
   };
 
-  /* Places in the middle of everything, and how far it reaches [mm]. */
-  const places = data.poses.map((pose) => pose.position).concat(data.poses.flatMap((pose) => (pose.rigid ? [pose.rigid.slice(0, 3)] : [])));
+  /* Places of targets, joints and base: the middle of everything, and how far it reaches [mm]. */
+  const triples = (list) => Array.from({ length: Math.floor(list.length / 3) }, (_, k) => list.slice(3 * k, 3 * k + 3));
+  const places = data.poses.map((pose) => pose.position).concat(data.poses.flatMap((pose) => triples(pose.rigid || [])));
   const ends = [0, 1, 2].map((k) => [Math.min(...places.map((p) => p[k])), Math.max(...places.map((p) => p[k]))]);
   const middle = ends.map(([low, high]) => (low + high) / 2);
   const reach = Math.max(1, ...places.map((p) => Math.hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])));
@@ -85,7 +86,7 @@
   if (most > 0) give.value = Math.min(3, Math.max(0, Math.log10((0.12 * reach) / most)));
   data.traced.forEach(([label], k) => input("colour").append(new Option(label, "traced" + k)));
 
-  const orbit = { yaw: -0.9, pitch: 0.45, distance: 2 };
+  const orbit = { yaw: -0.9, pitch: 0.45, distance: 2.3 };
   /* To the right, up, towards the eye; z of the measuring frame points up. */
   const directions = () => {
     const [cy, sy, cp, sp] = [Math.cos(orbit.yaw), Math.sin(orbit.yaw), Math.cos(orbit.pitch), Math.sin(orbit.pitch)];
