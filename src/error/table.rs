@@ -62,9 +62,9 @@ pub enum TableErrorKind {
     #[error(
         "{left} of {rows} measured rows have no partner in the joint table{}{}{}",
         nearest_in_time_hint(gap.as_deref()),
-        compared_keys(keys.as_ref()),
+        compared_keys(keys.as_deref()),
         if offset.is_some() {
-            clock_offset_remedy(offset.as_ref())
+            clock_offset_remedy(offset.as_deref())
         } else {
             ", and no other offset of the clocks certainly pairs them; check whether both clocks \
              agree, offset_s and tolerance_s, and leave out rows that the joint table does not log"
@@ -75,21 +75,21 @@ pub enum TableErrorKind {
         left: usize,
         rows: usize,
         gap: Option<String>,
-        keys: Option<[String; 2]>,
-        offset: Option<[String; 2]>,
+        keys: Option<Box<[String; 2]>>,
+        offset: Option<Box<[String; 2]>>,
     },
     #[error(
         "{same} of {rows} measured rows have the same partner, {partner}, an end of the joint \
          table; check whether both clocks agree, and tolerance_s{}{}",
-        compared_keys(keys.as_ref()),
-        clock_offset_remedy(offset.as_ref())
+        compared_keys(keys.as_deref()),
+        clock_offset_remedy(offset.as_deref())
     )]
     CommonPartner {
         same: usize,
         rows: usize,
         partner: String,
-        keys: Option<[String; 2]>,
-        offset: Option<[String; 2]>,
+        keys: Option<Box<[String; 2]>>,
+        offset: Option<Box<[String; 2]>>,
     },
     #[error(
         "the rows of both tables are typically {gap} apart, less than tolerance_s allows, and \

@@ -395,7 +395,8 @@ impl JoinedLog {
             return Ok(());
         }
         if 2 * left > rows {
-            let (gap, keys, offset) = (self.gap(), self.keys(), offset());
+            let (keys, offset) = (self.keys().map(Box::new), offset().map(Box::new));
+            let gap = self.gap();
             return error(TableErrorKind::MostUnpaired { left, rows, gap, keys, offset });
         }
         let gaps = self.gaps(false);
@@ -405,7 +406,8 @@ impl JoinedLog {
         }
         if let Some(row) = self.common_partner() {
             let partner = Location::file(&row.source.file).at_line(row.source.line).to_string();
-            let (same, keys, offset) = (row.uses, self.keys(), offset());
+            let (keys, offset) = (self.keys().map(Box::new), offset().map(Box::new));
+            let same = row.uses;
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
         }
         match shift {

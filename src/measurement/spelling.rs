@@ -70,7 +70,7 @@ fn common_words(names: &[&str]) -> [usize; 2] {
     let ends = first.char_indices().filter(is_mark).map(|(place, _)| place);
     let start = |&place: &usize| others.iter().all(|name| name.starts_with(&first[..place]));
     let end = |&place: &usize| others.iter().all(|name| name.ends_with(&first[place..]));
-    let before = starts.filter(start).last().unwrap_or(0);
+    let before = starts.filter(start).max().unwrap_or(0);
     let after = ends.filter(|place| *place >= before).find(end).unwrap_or(first.len());
     let shortest = names.iter().map(|name| name.len()).min().unwrap_or(0);
     if before + first.len() - after < shortest { [before, first.len() - after] } else { [0, 0] }

@@ -28,7 +28,10 @@ pub(crate) fn complete(problem: &Problem, text: &str) -> Result<Description, Inp
         let _ = write!(
             text,
             "\n{}",
-            parameters_of(problem, &distinguishable_parameters(problem, false)?)
+            parameters_of(
+                problem,
+                &distinguishable_parameters(problem, &[problem.joints.len()], false)?
+            )
         );
     } else {
         notes.push("the joints are a tree, so [parameters] is left to write".to_owned());

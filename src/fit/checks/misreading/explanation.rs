@@ -1,6 +1,7 @@
 //! Misreadings that explain why an arm does not fit its measurements.
 
 use super::Misreading;
+use super::search::MAX_NAMED;
 use crate::problem::{Effect, ParameterRule, Problem};
 
 /// Misreading with whose correction a full fit explains the measurements.
@@ -100,4 +101,18 @@ impl Explanations {
         let weights = finite.map(|deviance| ((least - deviance) / 2.0).exp());
         Some(MisreadEffect { effect, size, probability: weights.sum::<f64>().recip() })
     }
+}
+
+/// Number of words beyond which a text names no third misreading.
+const MAX_NAMED_WORDS: usize = 30;
+
+/// Joins descriptions of misreadings, the best first: two, and up to [`MAX_NAMED`] short ones.
+/// States how many others there are.
+pub(in crate::fit) fn first_of(words: &[String]) -> String {
+    let length = |count: usize| words[..count].join(" ").split(' ').count();
+    let is_short = |count: &usize| *count <= 2 || length(*count) <= MAX_NAMED_WORDS;
+    let count = (0..=words.len().min(MAX_NAMED)).rev().find(is_short).unwrap_or(0);
+    let more = (words.len() > count).then(|| format!("{} more", words.len() - count));
+    let named = words[..count].iter().cloned().chain(more);
+    named.collect::<Vec<_>>().join(", or ")
 }

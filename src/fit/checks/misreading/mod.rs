@@ -23,12 +23,12 @@ mod words;
 
 pub(in crate::fit) use explanation::Explanations;
 pub(crate) use explanation::MisreadEffect;
+pub(in crate::fit) use explanation::first_of;
 pub(in crate::fit) use images::is_of_views;
 pub(crate) use known_arm::misread_table;
 pub(in crate::fit) use masses::misread_masses;
 pub(in crate::fit) use search::{MAX_CLEAR_RATIO, MAX_NOISE_SIGMAS};
 pub(in crate::fit) use views::{start_of_fit, with_readings};
-pub(in crate::fit) use words::first_of;
 
 use crate::model::parameter::JointField;
 

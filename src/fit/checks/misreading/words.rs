@@ -5,27 +5,12 @@ use std::fmt;
 
 use super::candidates::name_of_mass;
 use super::commands::MILLIRADIANS;
-use super::search::MAX_NAMED;
 use super::{MassScale, Misreading, POSITION_UNITS, numbers_of, power_of_ten};
 use crate::error::Location;
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::fixture::carrier_word;
 use crate::problem::{Fixture, JointKind, Problem};
-
-/// Number of words beyond which a text names no third misreading.
-const MAX_NAMED_WORDS: usize = 30;
-
-/// Joins descriptions of misreadings, the best first: two, and up to [`MAX_NAMED`] short ones.
-/// States how many others there are.
-pub(in crate::fit) fn first_of(words: &[String]) -> String {
-    let length = |count: usize| words[..count].join(" ").split(' ').count();
-    let is_short = |count: &usize| *count <= 2 || length(*count) <= MAX_NAMED_WORDS;
-    let count = (0..=words.len().min(MAX_NAMED)).rev().find(is_short).unwrap_or(0);
-    let more = (words.len() > count).then(|| format!("{} more", words.len() - count));
-    let named = words[..count].iter().cloned().chain(more);
-    named.collect::<Vec<_>>().join(", or ")
-}
 
 /// Returns the name of an entry of the joint table, such as `alpha of joint 3`; `joint` is 0 for
 /// all joints.
