@@ -1,6 +1,6 @@
 //! Problems that `init` completes from a table of joints, typed from a data sheet.
 
-use crate::common::program::{Folder, assert_contains, run};
+use crate::common::program::{Folder, assert_contains};
 
 const SHEET: &str = "name = 'xr10'\ndh = 'standard'\njoint = [\n\
      { d_mm = 450, a_mm = 75, alpha_deg = -90, min_deg = -110, max_deg = 110 },\n\
@@ -13,7 +13,7 @@ const SHEET: &str = "name = 'xr10'\ndh = 'standard'\njoint = [\n\
 #[test]
 fn a_data_sheet_becomes_a_problem_that_holds_what_positions_cannot_tell() {
     let folder = Folder::with([("sheet.toml", SHEET)]);
-    let said = run(&folder, "init sheet.toml --out arm").success().stdout;
+    let said = folder.flexcal("init sheet.toml --out arm").success().stdout;
     assert_contains(&said, &["xr10: 6 moving joints", "target_m", "flexcal check arm --poses 40"]);
     let text = folder.read("arm/problem.toml");
     assert!(text.starts_with(SHEET));
@@ -25,8 +25,8 @@ fn a_data_sheet_becomes_a_problem_that_holds_what_positions_cannot_tell() {
     let data = "#   q1_deg, q2_deg, q3_deg, q4_deg, q5_deg, q6_deg, x_mm, y_mm, z_mm\n[data]\n";
     assert_contains(&text, &["[tool]\ntarget_m = [0, 0, 0]", held, data]);
     // Sections that are there are kept; a whole problem is returned as it was.
-    run(&folder, "init arm/problem.toml --out again").success();
+    folder.flexcal("init arm/problem.toml --out again").success();
     assert_eq!(folder.read("again/problem.toml"), text);
-    let wrong = run(&folder, "init sheet.toml --tip flange --out arm").code(2);
+    let wrong = folder.flexcal("init sheet.toml --tip flange --out arm").code(2);
     assert_contains(&wrong.stderr, &["--tip and --board belong to a URDF"]);
 }
