@@ -301,9 +301,11 @@ fn a_date_and_a_time_of_day_in_two_columns_are_one_instant() {
 
 #[test]
 fn names_and_numbers_of_rows_that_do_not_agree_are_refused_with_a_remedy() {
-    let tracker: String = (1..=8).map(|k| format!("pose_00{k}, {k}.5, 2.25, 3\n")).collect();
+    let tracker: Vec<String> = (1..=8).map(|k| format!("pose_00{k}, {k}.5, 2.25, 3\n")).collect();
+    let tracker = tracker.concat();
     let tracker = format!("Point, X, Y, Z\n{tracker}");
-    let log: String = (1..=9).map(|k| format!("VIA{k};{k},5;1\nMP{k};{k},5;1\n")).collect();
+    let log: Vec<String> = (1..=9).map(|k| format!("VIA{k};{k},5;1\nMP{k};{k},5;1\n")).collect();
+    let log = log.concat();
     let log = format!("Name;A1;A2\n{log}");
     assert_says(
         &read("", &tracker, &log).unwrap_err(),
