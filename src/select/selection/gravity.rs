@@ -16,6 +16,8 @@ use crate::select::left_out_gain::LeftOutGain;
 
 /// Number of fits of the search: with gravity as declared and along each axis, in both directions.
 const TRIALS: usize = 7;
+/// Maximum number of steps of a provisional fit. In the right direction, a few steps show the gain.
+const MAX_PROVISIONAL_STEPS: u64 = 40;
 /// Smallest cosine of the angle between two directions of gravity that count as one.
 const SAME_DIRECTION: f64 = 0.99;
 /// ln of the odds by which the final fit of a search must predict left-out poses better to exclude
@@ -53,7 +55,8 @@ pub(super) fn other_gravity(
     let with = |gravity: Vector3<f64>, provisional: bool| {
         let problem = Problem { gravity, ..state.problem(declared, &effects) };
         let options = declared.warm_started_options(state.options, true);
-        declared.fit_other(problem, data, &Options { provisional, ..options }).ok()
+        let max_steps = if provisional { Some(MAX_PROVISIONAL_STEPS) } else { options.max_steps };
+        declared.fit_other(problem, data, &Options { provisional, max_steps, ..options }).ok()
     };
     let ln_odds = |fitted: &Fitted, known: &Fitted| {
         let gain = LeftOutGain::new(fitted, known, data)?;
