@@ -17,6 +17,8 @@ use crate::select::left_out_gain::LeftOutGain;
 /// Largest number of fits of the search: provisional and complete ones, with gravity as declared (also
 /// without compliances that it contradicts) and along each axis in both directions.
 const TRIALS: usize = 15;
+/// Maximum number of steps of a provisional fit. In the right direction, a few steps show the gain.
+const MAX_PROVISIONAL_STEPS: u64 = 40;
 /// Smallest cosine of the angle between two directions of gravity that count as one.
 const SAME_DIRECTION: f64 = 0.99;
 /// Smallest ln of the odds by which another direction of gravity must predict left-out poses better
@@ -59,7 +61,9 @@ pub(super) fn other_gravity(
         let effects = [others.as_slice(), compliances].concat();
         let problem = Problem { gravity, ..state.problem(declared, &effects) };
         let options = declared.warm_started_options(state.options, true);
-        declared.fit_other(problem, data, &Options { provisional, ..options }).ok()
+        let few = || options.max_steps.unwrap_or(u64::MAX).min(MAX_PROVISIONAL_STEPS);
+        let max_steps = if provisional { Some(few()) } else { options.max_steps };
+        declared.fit_other(problem, data, &Options { provisional, max_steps, ..options }).ok()
     };
     let as_declared = declared.problem.gravity;
     let first = with(as_declared, &compliances, true)?;
