@@ -73,9 +73,9 @@ impl Measurements {
         };
         let pixels: Vec<(usize, Vector2<f64>, f64)> = (0..self.len()).filter_map(pixel).collect();
         if let Some((row, at, _)) = pixels.iter().find(|(_, at, _)| at.amax() > MAX_PIXEL) {
-            let axis = at.iamax();
-            let value = format!("{:.1}", at[axis]);
-            let location = self.location(*row).with_key(["column u_px", "column v_px"][axis]);
+            let is_u = at.x.abs() > at.y.abs();
+            let (column, value) = if is_u { ("column u_px", at.x) } else { ("column v_px", at.y) };
+            let (location, value) = (self.location(*row).with_key(column), format!("{value:.1}"));
             return Err(location.error(TableErrorKind::NoPlaceInImage { value }));
         }
         let largest = pixels.iter().map(|(_, at, _)| at.amax()).fold(0.0, f64::max);
