@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use flexcal::design::rivals;
 use flexcal::fit::{SavedEstimate, missing_target_columns};
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
@@ -91,9 +92,13 @@ impl Compensation {
         warnings.extend(missing.iter().map(text));
         let estimate = SavedEstimate::parse(estimate, Path::new("estimate.json"))
             .map_err(|error| raised(&error))?;
+        let rivals = rivals(&problem).unwrap_or_else(|error| {
+            warnings.push(format!("{error}; what the loop did not decide is not in the bounds"));
+            Vec::new()
+        });
         let found = detached(py, || {
             let targets = Arc::unwrap_or_clone(rows);
-            let fitted = (&estimate, correction, &[][..]);
+            let fitted = (&estimate, correction, rivals.as_slice());
             let solve = |targets: Measurements, frame: TargetFrame| {
                 remainder::Compensation::new(&problem, fitted, targets, frame, level)
             };
@@ -107,6 +112,7 @@ impl Compensation {
         let (found, Doubts { misplaced, others }) =
             found.map_err(|error: CompensationError| raised(&error))?;
         warnings.extend(misplaced.into_iter().chain(others));
+        warnings.extend(report::undecided_commands(&found, &rivals).map(|(said, _)| said));
         if found.is_base_open {
             warnings.push(
                 "the estimate does not know where the arm's base is in the measuring frame, so targets \

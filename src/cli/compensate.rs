@@ -8,8 +8,7 @@ use flexcal::design;
 use flexcal::error::{InputError, InputErrorKind, TableErrorKind};
 use flexcal::fit;
 use flexcal::measurement::Measurements;
-use flexcal::problem::Problem;
-use flexcal::remainder::{self, Compensation, Rival, TargetFrame};
+use flexcal::remainder::{self, Compensation, TargetFrame};
 use flexcal::report::{self, Doubts, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
@@ -74,22 +73,6 @@ fn with_start(mut error: InputError) -> InputError {
     error
 }
 
-/// Reads the effects that the loop which wrote the problem did not exclude from the loop.json beside
-/// it, if there is one.
-fn rivals(common: &Common, problem: &Problem) -> Vec<Rival> {
-    let named = common.problem();
-    let folder = if named.is_dir() { Some(named) } else { named.parent() };
-    let file = folder.map(|folder| folder.join("loop.json")).filter(|file| file.is_file());
-    match file.map(|file| design::rivals(&file, problem)) {
-        Some(Ok(rivals)) => rivals,
-        None => Vec::new(),
-        Some(Err(error)) => {
-            common.hint([format!("{error}; what the loop did not decide is not in the bounds")]);
-            Vec::new()
-        }
-    }
-}
-
 /// Finds the commands that reach the targets, writes `commands.csv`, and prints which targets are
 /// reached.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -125,7 +108,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         );
     }
     let correction = remainder::of_estimate(&problem, &estimate);
-    let rivals = rivals(common, &problem);
+    let rivals = design::rivals(&problem).unwrap_or_else(|error| {
+        common.hint([format!("{error}; what the loop did not decide is not in the bounds")]);
+        Vec::new()
+    });
     let fitted = (&estimate, correction.as_ref().ok().and_then(Option::as_ref), rivals.as_slice());
     let solve = |targets: Measurements, frame: TargetFrame| {
         Compensation::new(&problem, fitted, targets, frame, arguments.level)

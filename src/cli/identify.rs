@@ -8,7 +8,7 @@ use clap::{ArgAction, Args};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
 use flexcal::life::{PriorError, Update, update};
 use flexcal::measurement::Dataset;
-use flexcal::problem::{HeldOut, Problem};
+use flexcal::problem::{Freedom, HeldOut, ParameterRule, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
 use flexcal::report::{self, PredictionAccuracy};
 use flexcal::results::{
@@ -198,6 +198,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let sources = sources.as_ref().map(report::joint_sources_text);
     let outcome =
         diagnostic::report_fit_once(&identification, (common.quiet, common.prints_text()));
+    // Rules that free parameters are meant to: a later rule that holds all of them is a mistake.
+    let is_any_freed = |rule: &ParameterRule| !matches!(rule.freedom, Freedom::Fixed);
+    let holds_all =
+        identification.unknowns.is_empty() && problem.parameters.iter().any(is_any_freed);
+    let outcome = if holds_all { Outcome::NotMet } else { outcome };
     common.print_result(&json, || {
         let accuracy = PredictionAccuracy::new(&identification, &shown);
         let told = if arguments.verbose {

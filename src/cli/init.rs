@@ -19,6 +19,7 @@ use super::outcome::Outcome;
     after_help = "Examples:
   flexcal init panda.urdf --tip panda_link8 --out panda
   flexcal init panda.urdf --tip panda_link8 --out panda --board 9x6x25
+  flexcal init humanoid.urdf --tip head_camera --tip right_hand --board 9x6x25
   flexcal identify panda --data measurements.csv"
 )]
 pub struct Arguments {
@@ -28,11 +29,13 @@ pub struct Arguments {
     /// Link at the base of the arm [default: the root]
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
-    /// Link at its tip, which carries the target [default: the only leaf]
+    /// Link at its tip, which carries the target [default: the only leaf]; several times for the
+    /// branches of a tree, such as two arms or a head and a hand
     #[arg(long, value_name = "LINK")]
-    tip: Option<String>,
-    /// Board that a camera on the tip sees: inner corners along and across, and their distance in
-    /// mm. The problem then measures its pixels instead of positions
+    tip: Vec<String>,
+    /// Board that a camera on the tip sees, in the world or on the second tip: inner corners along
+    /// and across, and their distance in mm. The problem then measures its pixels instead of
+    /// positions
     #[arg(long, value_name = "9x6x25", value_parser = parse_board)]
     board: Option<Board>,
     #[command(flatten)]
@@ -69,16 +72,20 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         ));
     }
     let robot = Robot::read(&arguments.urdf)?;
-    let chain = Chain::new(&robot, arguments.base.as_deref(), arguments.tip.as_deref())?;
-    let description = describe_measured(&chain, arguments.board)?;
+    let mut tips = arguments.tip.iter().map(|tip| Some(tip.as_str()));
+    let to = |tip: Option<&str>| Chain::new(&robot, arguments.base.as_deref(), tip);
+    let chain = to(tips.next().flatten())?;
+    let further = tips.map(to).collect::<Result<Vec<Chain>, _>>()?;
+    let description = describe_measured(&chain, &further, arguments.board)?;
     let flags = &arguments.flags;
     let results =
         flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
     results.write(&[("problem.toml", &description.text)])?;
     let file = results.path("problem.toml");
-    let json = InitResult::new(&chain, &description, &file).to_json();
+    let json = InitResult::new(&chain, &further, &description, &file).to_json();
     flags.print_result(&json, || {
-        report::init_text(&chain, &description, (&results.folder, arguments.board.is_some()))
+        let has_board = arguments.board.is_some();
+        report::init_text(&chain, &further, &description, (&results.folder, has_board))
     })?;
     Ok(Outcome::Done)
 }

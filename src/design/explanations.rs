@@ -143,14 +143,19 @@ impl Named {
     }
 }
 
-/// Returns the effects that the loop.json of `problem` does not exclude in the place of effects
-/// that the problem declares and that the loop has fitted, each with its probability among all.
+/// Returns the effects that the loop.json beside the file of `problem` does not exclude in the place
+/// of effects that the problem declares and that the loop has fitted, each with its probability
+/// among all. Returns none without such a file.
 ///
 /// # Errors
 /// Returns the errors of [`Explanations::read`], except that the loop.json of another problem has
 /// none.
 #[doc(hidden)]
-pub fn rivals(file: &Path, problem: &Problem) -> Result<Vec<Rival>, Box<dyn Error>> {
+pub fn rivals(problem: &Problem) -> Result<Vec<Rival>, Box<dyn Error>> {
+    let file = &problem.data.location.file.with_file_name("loop.json");
+    if !file.is_file() {
+        return Ok(Vec::new());
+    }
     let document = match Document::read(file, problem) {
         Err(ExplanationsError::OtherProblem { .. }) => return Ok(Vec::new()),
         read => read?,

@@ -8,8 +8,8 @@ use thiserror::Error;
 use super::NoRows;
 use super::near::{is_it_rather, key_suggestion, pattern_suggestion, suggestion};
 use super::phrases::{
-    behind_camera_remedy, decimal_comma_hint, joined_list, near_quote, plural, stiffness_units,
-    windows_path_hint, with_remedy,
+    behind_camera_remedy, decimal_comma_hint, joined_list, missed, near_quote, plural,
+    stiffness_units, windows_path_hint, with_remedy,
 };
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
@@ -223,14 +223,14 @@ pub enum InputErrorKind {
     #[error("{word} is no point of the marker, whose points are numbered from 0 to {last}")]
     NoSuchPoint { word: String, last: usize },
     #[error(
-        "the point is behind the camera; {}", behind_camera_remedy(*fits, *miss, readings)
+        "the point is behind the camera; {}", behind_camera_remedy((*fits, *few), *miss, readings)
     )]
-    PointBehindCamera { fits: Option<bool>, miss: Option<f64>, readings: Vec<String> },
+    PointBehindCamera { fits: Option<bool>, miss: Option<f64>, few: usize, readings: Vec<String> },
     #[error(
         "the points of the images of camera \"{camera}\" fit no pose of marker \"{marker}\": \
-         they miss the nearest one by {declared:.1} px, and by {transposed:.1} px with corners \
-         along and across exchanged; declare points_mm as the detector counts them (a board of \
-         10 × 7 instead of 7 × 10)"
+         {}, and by {transposed:.1} px with corners along and across exchanged; declare points_mm as \
+         the detector counts them, columns and rows exchanged",
+        missed(*declared)
     )]
     GridTransposed { camera: String, marker: String, declared: f64, transposed: f64 },
     #[error(

@@ -131,16 +131,34 @@ pub(super) fn decimal_comma_remedy(found: usize, expected: usize) -> &'static st
     }
 }
 
+/// States by how much the points of images miss the nearest pose of a marker \[px\]; infinity if they
+/// fit none.
+pub(super) fn missed(miss: f64) -> String {
+    if miss.is_finite() {
+        format!("they miss the nearest one by {miss:.1} px")
+    } else {
+        "they miss it far".to_owned()
+    }
+}
+
 /// Returns the remedy for a point behind the camera. `fits` is true if the points of the images fit
-/// the marker by themselves, which they miss by `miss` \[px\].
+/// the marker by themselves, which they miss by `miss` \[px\]. `few` is the largest number of points
+/// in an image if that is too small for a pose, otherwise 0.
 pub(super) fn behind_camera_remedy(
-    fits: Option<bool>,
+    (fits, few): (Option<bool>, usize),
     miss: Option<f64>,
     readings: &[String],
 ) -> String {
     if !readings.is_empty() {
         let named = readings.join(", or ");
         return format!("the images fit if the table is read in another way: with {named}");
+    }
+    if few > 0 {
+        return format!(
+            "no image shows more than {few} point{} of this marker, and it takes four to tell where \
+             it is: detect more points, or declare at_m and rotation_deg of camera and marker well",
+            plural(few)
+        );
     }
     let miss = miss.filter(|miss| miss.is_finite());
     let miss = miss.map_or_else(|| "far".to_owned(), |miss| format!("by {miss:.1} px"));

@@ -189,6 +189,8 @@ pub enum TableErrorKind {
          u_px = cx + fx u and v_px = cy + fy v, with the distortion applied"
     )]
     NormalisedPixels { largest: String },
+    #[error("{value} px is no place in an image; correct the row, or leave it out")]
+    NoPlaceInImage { value: String },
     #[error(
         "qx, qy, qz, qw are not a rotation, because their squares do not add up to 1; check the \
          columns"
@@ -318,6 +320,8 @@ pub enum TableErrorKind {
     JointsFromZero,
     #[error("\"{value}\" is not a number")]
     NotANumber { value: String },
+    #[error("\"{value}\" is a sign without a number; write {value}1, or 0 for none")]
+    SignAlone { value: String },
     #[error("\"{value}\" contains {found}; {remedy}")]
     Typographic { value: String, found: String, remedy: &'static str },
     #[error(
@@ -364,8 +368,9 @@ pub enum TableErrorKind {
     )]
     JoinedWithItself { path: PathBuf },
     #[error(
-        "\"{word}\" is neither identification nor validation, the two words of this column{}",
-        is_it_rather("", *meant)
+        "\"{word}\" is neither identification nor validation, the two words of this column{}{}",
+        is_it_rather("", *meant),
+        if *is_session { "; to hold out a session write held_out = { session = \"…\" } with its name" } else { "" }
     )]
-    UnknownSplit { word: String, meant: Option<&'static str> },
+    UnknownSplit { word: String, meant: Option<&'static str>, is_session: bool },
 }

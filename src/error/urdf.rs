@@ -80,7 +80,14 @@ pub enum UrdfErrorKind {
     EndsExchanged { base: String, tip: String },
     #[error(
         "link \"{tip}\" is not below link \"{base}\"; {}",
-        if above.is_empty() { "it is the root".to_owned() } else { format!("above it are {}", above.join(", ")) }
+        if above.is_empty() {
+            "it is the root".to_owned()
+        } else {
+            format!(
+                "above it are {}; for two branches of one trunk write --tip {base} --tip {tip}",
+                above.join(", ")
+            )
+        }
     )]
     NotBelow { base: String, tip: String, above: Vec<String> },
     #[error(

@@ -358,13 +358,20 @@ impl Converted {
 }
 
 /// Returns the geometry of `arm` as YAML, with the parameters that a problem file has: `T_i` =
-/// Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β).
+/// Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β). In a tree each joint states the `parent` on which it stands.
 pub fn modified_dh(problem: &Problem, arm: &Arm<f64>) -> String {
     let mut text = "# Modified Denavit-Hartenberg parameters with Hayati's beta; q adds to theta, of a prismatic joint to d:\n\
                     # T_i = Rx(alpha) Tx(a) Rz(theta + q) Tz(d) Ry(beta)\nmdh:\n"
         .to_owned();
+    let before = |place: usize| place.checked_sub(1);
+    let is_tree = (0..).zip(&problem.joints).any(|(place, joint)| joint.parent != before(place));
     for (declared, joint) in problem.joints.iter().zip(&arm.joints) {
         let _ = writeln!(text, "  {}:", yaml_key(&declared.name));
+        if is_tree {
+            let parent = declared.parent.and_then(|parent| problem.joints.get(parent));
+            let parent = parent.map_or("base".to_owned(), |parent| yaml_key(&parent.name));
+            let _ = writeln!(text, "    parent: {parent}");
+        }
         if let Some(placed) = &joint.placement {
             let rpy = placed.rpy.each_ref().map(|angle| angle.value);
             let _ = writeln!(text, "    xyz_m: {}", list(placed.xyz.as_slice()));

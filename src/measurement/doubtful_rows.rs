@@ -20,6 +20,9 @@ const MIN_NORMALISED_ROWS: usize = 8;
 const MAX_NORMALISED: f64 = 3.0;
 /// Smallest focal length that is in pixels \[px\].
 const MIN_PIXEL_FOCAL: f64 = 30.0;
+/// Largest absolute coordinate of a pixel \[px\]; images are smaller by far, and a fit to one such
+/// row takes long.
+const MAX_PIXEL: f64 = 1e5;
 /// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
 /// \[m\].
 const MIN_TURN: f64 = std::f64::consts::PI / 180.0;
@@ -59,8 +62,8 @@ impl Measurements {
         }
     }
 
-    /// Checks that the pixels of a camera with a focal length in pixels are no normalised image
-    /// coordinates.
+    /// Checks that the pixels of all cameras are places in an image, and those of a camera with a focal
+    /// length in pixels no normalised image coordinates.
     pub(super) fn require_pixels(&self, problem: &Problem) -> Result<(), InputError> {
         let pixel = |row: usize| {
             let Observation::Pixel(camera, ..) = self.observation(row) else { return None };
@@ -69,6 +72,12 @@ impl Measurements {
             Some((row, self.positions.get(row)?.xy(), focal.unwrap_or(0.0)))
         };
         let pixels: Vec<(usize, Vector2<f64>, f64)> = (0..self.len()).filter_map(pixel).collect();
+        if let Some((row, at, _)) = pixels.iter().find(|(_, at, _)| at.amax() > MAX_PIXEL) {
+            let is_u = at.x.abs() > at.y.abs();
+            let (column, value) = if is_u { ("column u_px", at.x) } else { ("column v_px", at.y) };
+            let (location, value) = (self.location(*row).with_key(column), format!("{value:.1}"));
+            return Err(location.error(TableErrorKind::NoPlaceInImage { value }));
+        }
         let largest = pixels.iter().map(|(_, at, _)| at.amax()).fold(0.0, f64::max);
         let is_normalised = pixels.len() >= MIN_NORMALISED_ROWS
             && largest < MAX_NORMALISED

@@ -4,17 +4,21 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::shell::shell_word;
-use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
+use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM, names_of_joints};
 
-/// Describes the problem that was made from a URDF and written to `folder`, and the next steps. If
+/// Describes the problem that was made from a URDF, with its `further` branches, and written to `folder`, and the next steps. If
 /// `has_camera`, these are for a camera that sees a board.
 pub fn init_text(
     chain: &Chain,
+    further: &[Chain],
     description: &Description,
     (folder, has_camera): (&Path, bool),
 ) -> String {
-    let (base, tip) = chain.ends();
-    let joints = chain.joint_names();
+    let (base, first) = chain.ends();
+    let tips: Vec<&str> = further.iter().map(|chain| chain.ends().1).collect();
+    let tip = [&[first], tips.as_slice()].concat().join(" and ");
+    let joints = names_of_joints(chain, further);
+    let target = if further.is_empty() { "target_m" } else { "at_m    " };
     let mut words = format!(
         "{}: {} moving joints from {base} to {tip}\n  {}\n",
         description.name,
@@ -33,18 +37,19 @@ pub fn init_text(
              focal_px, centre_px  of your camera, roughly; they are fitted\n  \
              image_px             width and height of its images\n  \
              pixel_sigma          1 σ of a found corner\n  \
-             on                   the frame that carries the camera and the board; now {tip} and the world\n\
+             on                   the frame that carries the camera and the board; now {first} and {}\n\
              and put measurements.csv beside it, with a row for each corner of each image; \
              problem.toml\nlists the columns it needs.\n\
              Where camera and board are need not be known; the views decide it.\n\
-             Next: flexcal identify {word}, then flexcal loop {word}\n"
+             Next: flexcal identify {word}, then flexcal loop {word}\n",
+            tips.first().unwrap_or(&"the world")
         );
         return words;
     }
     let _ = write!(
         words,
         "\nWritten to {written}. Fill in there\n  \
-         target_m           where the measured point sits in the frame of {tip}, roughly; now its origin\n  \
+         {target}           where the measured point sits in the frame of {tip}, roughly; now its origin\n  \
          position_sigma_mm  1 σ of a coordinate that your instrument measures; now {SIGMA_MM}\n  \
          held_out           now {} % of the poses are held out to judge the fit\n\
          and put measurements.csv beside it; problem.toml lists the columns it needs. flexcal \

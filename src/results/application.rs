@@ -13,7 +13,7 @@ use super::summary::Summary;
 use crate::fit::{Command, ErrorsBySession, PointSpread};
 use crate::problem::Problem;
 use crate::remainder::{BoundTest, Bounds, Compared};
-use crate::urdf::{Chain, Description};
+use crate::urdf::{Chain, Description, names_of_joints};
 
 /// Errors of predictions against measurements.
 #[derive(Debug, Default, Serialize, JsonSchema)]
@@ -102,7 +102,7 @@ pub struct InitResult {
     pub file: String,
     pub base: String,
     pub tip: String,
-    /// Moving joints from base to tip.
+    /// Moving joints from base to tip, then those of each further branch.
     pub joints: Vec<String>,
     pub notes: Vec<String>,
 }
@@ -139,15 +139,16 @@ impl CompensationResult {
 }
 
 impl InitResult {
-    /// Collects the result of converting a chain into `description`, which was written to `file`.
-    pub fn new(chain: &Chain, description: &Description, file: &Path) -> Self {
+    /// Collects the result of converting a chain, with the `further` ones of a tree, into
+    /// `description`, which was written to `file`.
+    pub fn new(chain: &Chain, further: &[Chain], description: &Description, file: &Path) -> Self {
         let (base, tip) = chain.ends();
         Self {
             problem: description.name.clone(),
             file: file.display().to_string(),
             base: base.to_owned(),
             tip: tip.to_owned(),
-            joints: chain.joint_names(),
+            joints: names_of_joints(chain, further),
             notes: description.notes.iter().map(ToString::to_string).collect(),
         }
     }

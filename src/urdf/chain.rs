@@ -220,6 +220,18 @@ impl<'a> Chain<'a> {
     }
 }
 
+/// Returns the names of the moving joints of a chain, then those of each further chain that the ones
+/// before it do not move.
+pub(crate) fn names_of_joints(chain: &Chain, further: &[Chain]) -> Vec<String> {
+    let mut names = chain.joint_names();
+    for name in further.iter().flat_map(Chain::joint_names) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
 /// Returns a frame whose z axis is along `axis`, by the smallest rotation from the identity.
 fn axis_frame(axis: &Vector3<f64>) -> Frame<f64> {
     let horizontal = axis.x.hypot(axis.y);

@@ -6,7 +6,9 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::chain::{Chain, moved};
+use super::carried::carried_masses;
+use super::chain::Chain;
+use super::fork::{Fork, trunk};
 use super::free::distinguishable_parameters;
 use super::lines::Step;
 use super::notes;
@@ -48,13 +50,19 @@ pub struct Description {
 
 /// Table `[[joint]]` of the problem that is written.
 #[derive(Default)]
-struct Row {
+pub(super) struct Row {
     name: String,
+    /// Index of the moving joint in the robot; `None` for a fixed joint.
+    pub joint: Option<usize>,
+    /// Number of the joint on which the first row of a further chain stands, from 1; 0 for the base.
+    parent: Option<usize>,
+    /// Frame of the row with all joints at zero, in the frame of the base.
+    pub frame: Frame<f64>,
     /// Kind of the joint as in problem files: `revolute`, `prismatic` or `fixed`.
     kind: &'static str,
     /// Placement by xyz and rpy; `None` for moving joints.
     placement: Option<Frame<f64>>,
-    /// Number of the joint that a mimic joint follows, from 1, and the factor.
+    /// Index in the robot of the joint that a mimic joint follows, and the factor.
     mimic: Option<(usize, f64)>,
     /// Joint parameters α \[rad\], a \[m\], θ \[rad\], d \[m\], β \[rad\].
     numbers: [f64; 5],
@@ -69,21 +77,29 @@ struct Row {
 /// # Errors
 /// Returns an error if a number of the URDF is too large for a problem.
 pub fn describe(chain: &Chain) -> Result<Description, InputError> {
-    describe_measured(chain, None)
+    describe_measured(chain, &[], None)
 }
 
-/// Converts a chain like [`describe`]. A `board` (numbers of corners along and across, their
-/// distance \[mm\]) makes a problem of a camera at the tip that sees it; otherwise positions are
-/// measured.
+/// Converts a chain like [`describe`], with the chains to further tips of the same robot as branches
+/// of one tree. A `board` (numbers of corners along and across, their distance \[mm\]) makes a
+/// problem of a camera at the tip that sees it, in the world or at the second tip; otherwise
+/// positions are measured.
 ///
 /// # Errors
 /// Returns the errors of [`describe`].
-pub(crate) fn describe_measured(
+pub fn describe_measured(
     chain: &Chain,
+    further: &[Chain],
     board: Option<([usize; 2], f64)>,
 ) -> Result<Description, InputError> {
     let mut notes = Vec::new();
-    let rows = rows(chain, &mut notes);
+    let (mut rows, mut tips) = (Vec::new(), Vec::new());
+    let chains: Vec<&Chain> = std::iter::once(chain).chain(further).collect();
+    for (of, branch) in chains.iter().enumerate() {
+        let more = self::rows(branch, &Fork::new(&chains, of, &rows), &mut notes);
+        rows.extend(more);
+        tips.push((branch.ends().1, rows.len()));
+    }
     let name = name(&chain.robot.name);
     let arm = arm_toml(chain, &name, &rows);
     // Only numbers of excessive size cause an error here.
@@ -93,11 +109,26 @@ pub(crate) fn describe_measured(
             chain.robot.error(UrdfErrorKind::AsProblem { key, why: kind.to_string() })
         },
     )?;
-    let free = distinguishable_parameters(&problem, board.is_some())?;
-    notes.extend(notes::of_chain(chain));
-    let view = board.map_or_else(|| TOOL.to_owned(), |(corners, distance)| view(corners, distance));
+    let ends: Vec<usize> = tips.iter().map(|(_, end)| *end).collect();
+    let mut free = distinguishable_parameters(&problem, &ends, board.is_some())?;
+    if board.is_some() && !further.is_empty() {
+        // A camera on one branch that looks at another one does not see how the trunk moves.
+        let trunk = trunk(&chains);
+        let is_of_trunk = |row: &Row| row.joint.is_some_and(|joint| trunk.contains(&joint));
+        for (number, _) in (1..).zip(&rows).filter(|(_, row)| is_of_trunk(row)) {
+            free.retain(|name| !name.starts_with(&format!("joint{number}.")));
+        }
+    }
+    notes.extend(notes::of_chain(chain, further));
+    let names: Vec<String> =
+        ends.iter().filter_map(|end| Some(rows.get(end - 1)?.name.clone())).collect();
+    let view = match board {
+        Some((corners, distance)) => view(corners, distance, &names),
+        None if further.is_empty() => TOOL.to_owned(),
+        None => targets(&tips),
+    };
     let (parameters, data) =
-        (parameters(&rows, &free, board.is_some()), data(chain, &rows, board.is_some()));
+        (parameters(&rows, &free, board.is_some()), data(&chains, &rows, board.is_some()));
     let text = format!("{arm}{view}\n{parameters}\n{data}");
     Ok(Description { name, text, notes })
 }
@@ -109,39 +140,48 @@ fn avoid_joint_names(chain: &Chain, name: &str) -> String {
     if is_joint_name { format!("{name} frame") } else { name.to_owned() }
 }
 
-/// Converts a chain to the joints of a problem; adds notes about assumptions to `notes`.
-fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
-    let mut steps: Vec<Step> =
-        chain.stages.iter().map(|stage| Step::from_frame(&stage.step)).collect();
+/// Converts a chain, behind a fork, to the joints of a problem; adds notes about assumptions to
+/// `notes`.
+fn rows(chain: &Chain, fork: &Fork, notes: &mut Vec<String>) -> Vec<Row> {
+    let stages = chain.stages.get(fork.shared..).unwrap_or_default();
+    let start = stages.first().map(|stage| fork.in_row(&stage.step));
+    let steps = start.iter().chain(stages.iter().skip(1).map(|stage| &stage.step));
+    let mut steps: Vec<Step> = steps.map(Step::from_frame).collect();
     let mut rows = Vec::new();
     // The parameters α and a may not suffice to reach the first axis from the base.
-    if let (Some(first), Some(stage)) = (steps.first_mut(), chain.stages.first())
+    if let (Some(first), Some(start)) = (steps.first_mut(), start)
         && [first.theta_before, first.d_before, first.beta]
             .iter()
             .any(|value| value.abs() > MAX_ROUNDING)
     {
         *first = Step::default();
+        let tip = fork.parent.map(|_| format!("{} mounting", chain.ends().1));
         rows.push(Row {
-            name: avoid_joint_names(chain, "mounting"),
+            name: avoid_joint_names(chain, tip.as_deref().unwrap_or("mounting")),
             kind: "fixed",
-            placement: Some(stage.step),
+            placement: Some(start),
             ..Row::default()
         });
     }
     let rows_before_chain = rows.len();
     // The transform after the last joint becomes its θ and d if possible, otherwise a fixed joint.
     let [x, _, z] = &chain.end.axes;
-    let on_axis = z.xy().norm() + chain.end.origin.xy().norm() < MAX_ROUNDING && z.z > 0.0;
+    let on_axis = z.xy().norm() + chain.end.origin.xy().norm() < MAX_ROUNDING
+        && z.z > 0.0
+        && !stages.is_empty();
     let end =
         Step { theta_before: x.y.atan2(x.x), d_before: chain.end.origin.z, ..Step::default() };
     steps.push(if on_axis { end } else { Step::default() });
-    for ((stage, step), next) in chain.stages.iter().zip(&steps).zip(steps.iter().skip(1)) {
+    for ((stage, step), next) in stages.iter().zip(&steps).zip(steps.iter().skip(1)) {
         let Some(joint) = chain.robot.joints.get(stage.joint) else { continue };
         rows.push(Row {
             name: joint.name.clone(),
+            joint: Some(stage.joint),
             kind: if joint.kind == Kind::Prismatic { "prismatic" } else { "revolute" },
             placement: None,
-            mimic: stage.mimic.map(|(leader, ratio)| (leader + rows_before_chain + 1, ratio)),
+            mimic: stage
+                .mimic
+                .and_then(|(leader, ratio)| Some((chain.stages.get(leader)?.joint, ratio))),
             numbers: [
                 step.alpha,
                 step.a,
@@ -150,7 +190,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
                 next.beta,
             ],
             limits: Some(joint.limits).filter(|_| stage.mimic.is_none()),
-            bodies: Vec::new(),
+            ..Row::default()
         });
         if joint.lacks_axis {
             let start = joint.span.start;
@@ -179,21 +219,22 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     }
     if !on_axis {
         let name = avoid_joint_names(chain, chain.ends().1);
-        rows.push(Row { name, kind: "fixed", placement: Some(chain.end), ..Row::default() });
+        let end = if stages.is_empty() { fork.in_row(&chain.end) } else { chain.end };
+        rows.push(Row { name, kind: "fixed", placement: Some(end), ..Row::default() });
     }
-    let mut frame = Frame::identity();
-    let frames: Vec<Frame<f64>> = rows
-        .iter()
-        .map(|row| {
-            frame = advanced(&frame, row);
-            frame
-        })
-        .collect();
-    let (masses, beside) = carried_masses(chain);
+    if let Some(first) = rows.first_mut() {
+        first.parent = fork.parent;
+    }
+    let mut frame = fork.frame;
+    for row in &mut rows {
+        frame = advanced(&frame, row);
+        row.frame = frame;
+    }
+    let (masses, beside) = carried_masses(chain, &fork.beside);
     for link in masses {
-        let place = link.stage + rows_before_chain;
-        if let (Some(row), Some(frame)) = (rows.get_mut(place), frames.get(place)) {
-            let at = frame.resolve(&(link.at - frame.origin));
+        let place = link.stage.checked_sub(fork.shared).map(|place| place + rows_before_chain);
+        if let Some(row) = place.and_then(|place| rows.get_mut(place)) {
+            let at = row.frame.resolve(&(link.at - row.frame.origin));
             row.bodies.push((link.name, link.mass, at));
         }
     }
@@ -263,12 +304,17 @@ fn arm_toml(chain: &Chain, name: &str, rows: &[Row]) -> String {
         quoted(base),
         quoted(tip)
     );
+    let number_of = |joint: usize| rows.iter().position(|row| row.joint == Some(joint));
     for row in rows {
         let _ = write!(text, "\n[[joint]]\nname = {}\n", quoted(&row.name));
+        if let Some(parent) = row.parent {
+            let _ = writeln!(text, "parent = {parent}");
+        }
         if row.kind != "revolute" {
             let _ = writeln!(text, "kind = \"{}\"", row.kind);
         }
-        if let Some((leader, ratio)) = row.mimic {
+        let mimic = row.mimic.and_then(|(leader, ratio)| Some((number_of(leader)? + 1, ratio)));
+        if let Some((leader, ratio)) = mimic {
             let _ = writeln!(text, "mimic = {{ joint = {leader}, ratio = {} }}", number(ratio));
         }
         if let Some(frame) = &row.placement {
@@ -322,22 +368,43 @@ fn arm_toml(chain: &Chain, name: &str, rows: &[Row]) -> String {
     text
 }
 
-/// Returns the sections of a camera on the tip and a board in the world. The board has `columns` ×
-/// `rows` corners at a `distance` \[mm\], in the order of OpenCV.
-fn view([columns, rows]: [usize; 2], distance: f64) -> String {
+/// Returns the sections of the measured points of a tree, one for each of its `tips`: name and number
+/// of the joint that carries it.
+fn targets(tips: &[(&str, usize)]) -> String {
+    let of_tip = |(name, joint): &(&str, usize)| {
+        format!(
+            "\n[[target]]\nname = {}\njoint = {joint}\n\
+             at_m = [0, 0, 0]                                 # fill in: the measured point, in the frame of this tip\n",
+            quoted(name)
+        )
+    };
+    let main = tips.first().map_or(0, |(_, joint)| *joint);
+    let of_tips: String = tips.iter().map(of_tip).collect();
+    format!(
+        "\n[tool]\njoint = {main}                                        # the frame that carries the payload\n{of_tips}"
+    )
+}
+
+/// Returns the sections of a camera on the tip and a board in the world, or on the second of several
+/// `tips`. The board has `columns` × `rows` corners at a `distance` \[mm\], in the order of OpenCV.
+fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String]) -> String {
+    let on = |tip: usize| tips.get(tip).filter(|_| tips.len() > 1).map(|name| quoted(name));
+    let (camera, board) =
+        (on(0).unwrap_or("\"tool\"".to_owned()), on(1).unwrap_or("\"world\"".to_owned()));
+
     let corner = |k: usize| {
         let place = |count: usize| number(count as f64 * distance);
         format!("[{}, {}, 0]", place(k % columns), place(k / columns))
     };
     let corners: Vec<String> = (0..columns * rows).map(corner).collect();
     format!(
-        "\n[[camera]]\nname = \"camera\"\non = \"tool\"                                     # the frame that carries it; \"world\" if it stands apart\n\
+        "\n[[camera]]\nname = \"camera\"\non = {camera}                                     # the frame that carries it; \"world\" if it stands apart\n\
          focal_px = [900, 900]                            # fill in, roughly: it is fitted\n\
          centre_px = [640, 360]                           # fill in: half of the image\n\
          image_px = [1280, 720]                           # fill in: width and height\n\
          distortion = [0, 0, 0, 0, 0]                     # k1, k2, p1, p2, k3\n\
          pixel_sigma = 0.3                                # fill in: 1 σ of u and v of a found corner\n\n\
-         [[marker]]\nname = \"board\"\non = \"world\"                                     # or a frame of the arm, \"tool\" for one\n\
+         [[marker]]\nname = \"board\"\non = {board}                                     # or a frame of the arm, \"tool\" for one\n\
          points_mm = [{}]\n",
         corners.join(", ")
     )
@@ -382,7 +449,7 @@ fn parameters(rows: &[Row], free: &[String], has_camera: bool) -> String {
 }
 
 /// Returns the section `[data]`, with the names of the columns as comments.
-fn data(chain: &Chain, rows: &[Row], has_camera: bool) -> String {
+fn data(chains: &[&Chain], rows: &[Row], has_camera: bool) -> String {
     let moving = rows.iter().filter(|row| row.kind != "fixed" && row.mimic.is_none());
     let column =
         |row: &Row| format!("{}_{}", row.name, if row.kind == "prismatic" { "m" } else { "rad" });
@@ -398,6 +465,10 @@ fn data(chain: &Chain, rows: &[Row], has_camera: bool) -> String {
         );
         return text;
     }
+    let tips: Vec<&str> = chains.iter().map(|chain| chain.ends().1).collect();
+    if tips.len() > 1 {
+        let _ = writeln!(text, "#   target: which of {} a row measures", tips.join(", "));
+    }
     let _ = write!(
         text,
         "#   x_mm, y_mm, z_mm: the target, which moves with {}, in the measuring frame\n\
@@ -405,56 +476,7 @@ fn data(chain: &Chain, rows: &[Row], has_camera: bool) -> String {
          position_sigma_mm = {SIGMA_MM}                         # 1 σ of a measured coordinate: put in that of your instrument\n\
          # orientation_sigma_deg = 0.02                   # 1 σ of a measured orientation; without it orientations in the table are not fitted\n\
          held_out = {{ fraction = {HELD_OUT}, seed = 1 }}          # poses that judge and are not fitted\n",
-        chain.ends().1
+        tips.join(" or ")
     );
     text
-}
-
-/// Mass of a link of the chain or of a branch of it, with the moving joint that moves it.
-pub(super) struct CarriedMass {
-    /// Index of the last moving joint of the chain before the link, among the stages.
-    pub stage: usize,
-    /// Name of the link.
-    pub name: String,
-    /// Mass of the link \[kg\].
-    pub mass: f64,
-    /// Centre of mass with all joints at zero, frame of the chain's base \[m\].
-    pub at: Vector3<f64>,
-}
-
-/// Returns all links with a mass that the chain's moving joints move, in the order of the joints.
-/// Also returns the names of the other moving joints that they move, which are taken at zero.
-pub(super) fn carried_masses(chain: &Chain) -> (Vec<CarriedMass>, Vec<String>) {
-    let robot = chain.robot;
-    let (mut masses, mut beside) = (Vec::new(), Vec::new());
-    // Each entry is a link with its frame and the stage that moves it, from the base outwards.
-    let mut open = vec![(chain.base, Frame::identity(), None)];
-    while let Some((link, frame, carrier)) = open.pop() {
-        if let (Some(stage), Some(body)) = (carrier, robot.links.get(link))
-            && body.mass > 0.0
-        {
-            masses.push(CarriedMass {
-                stage,
-                name: body.name.clone(),
-                mass: body.mass,
-                at: frame.point(&body.com),
-            });
-        }
-        for (index, joint) in
-            robot.joints.iter().enumerate().filter(|(_, joint)| joint.parent == link)
-        {
-            let mut next = frame.compose(&joint.origin.frame());
-            let stage = chain.stages.iter().position(|stage| stage.joint == index);
-            if let Some(moving) = stage.and_then(|stage| chain.stages.get(stage)) {
-                // A mimic joint may have an offset when its leader is at zero.
-                next = moved(&next.compose(&moving.axis), joint, moving.offset)
-                    .compose(&moving.axis.inverse());
-            } else if joint.kind != Kind::Fixed && carrier.is_some() {
-                beside.push(joint.name.clone());
-            }
-            open.push((joint.child, next, stage.or(carrier)));
-        }
-    }
-    masses.sort_by_key(|link| link.stage);
-    (masses, beside)
 }

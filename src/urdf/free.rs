@@ -8,7 +8,7 @@ use crate::least_squares::jacobian;
 use crate::model::parameter::Parameter;
 use crate::model::{MeasuredOrientation, Model, Pose, PoseResiduals};
 use crate::problem::{
-    Freedom, JointKind, Observation, ParameterRule, PoseView, Problem, Quantities,
+    Freedom, JointKind, Observation, ParameterRule, PoseView, Problem, Quantities, Target,
 };
 use crate::random::stream;
 
@@ -20,13 +20,14 @@ const MAX_SAMPLED_ANGLE: f64 = 3.0;
 /// Largest magnitude of a random command of a prismatic joint \[m\].
 const MAX_SAMPLED_TRAVEL: f64 = 0.5;
 
-/// Returns the names of the parameters that measured positions of an off-axis target distinguish.
-/// If `are_oriented` is true, orientations are measured, too, as by views of a board.
+/// Returns the names of the parameters that measured positions of an off-axis target distinguish, on
+/// the joint of each number in `ends` (from 1). If `are_oriented` is true, orientations are measured, too, as by views of a board.
 ///
 /// Base and tool come first, then α, a, θ, d of all joints, then β. A parameter is chosen if its
 /// Jacobian column is independent of the chosen ones, at random poses within the joint limits.
 pub(super) fn distinguishable_parameters(
     problem: &Problem,
+    ends: &[usize],
     are_oriented: bool,
 ) -> Result<Vec<String>, InputError> {
     let mut problem = problem.clone();
@@ -43,7 +44,19 @@ pub(super) fn distinguishable_parameters(
     problem.parameters = vec![ParameterRule { pattern: "*".to_owned(), freedom, location }];
     problem.tool.target = Vector3::new(0.11, 0.07, 0.05);
     let unnamed = [String::new()];
-    let model = Model::new(&problem, &unnamed, &unnamed)?;
+    let mut targets = unnamed.to_vec();
+    if ends.len() > 1 {
+        let target = |end: &usize| Target {
+            name: end.to_string(),
+            joint: end - 1,
+            at: problem.tool.target,
+            rotation: Vector3::zeros(),
+            location: problem.data.location.clone(),
+        };
+        problem.targets = ends.iter().map(target).collect();
+        targets = problem.targets.iter().map(|target| target.name.clone()).collect();
+    }
+    let model = Model::new(&problem, &unnamed, &targets)?;
     let count = model.parameters.len();
     let mut random = stream(1, 0);
     let mut draw = |joint: &crate::problem::Joint| {
@@ -59,11 +72,11 @@ pub(super) fn distinguishable_parameters(
         (0..count).map(|_| problem.joints.iter().map(&mut draw).collect()).collect();
     let measured = Vector3::zeros();
     let mut poses = Vec::with_capacity(count);
-    for configuration in &configurations {
+    for (row, configuration) in configurations.iter().enumerate() {
         poses.push(Pose {
             setup: PoseView::from_configuration(configuration),
             base: 0,
-            target: 0,
+            target: row % targets.len(),
             observation: Observation::default(),
             measured: &measured,
             sigma: 1.0,

@@ -7,9 +7,11 @@
 //! gauge of that axis.
 
 mod branch;
+mod carried;
 mod chain;
 mod describe;
 mod export;
+mod fork;
 mod free;
 mod lines;
 mod mounted;
@@ -22,15 +24,16 @@ mod yaml;
 
 pub(crate) use branch::Steps;
 pub use chain::Chain;
+pub(crate) use chain::names_of_joints;
+pub(crate) use describe::SIGMA_MM;
 pub use describe::{Description, describe};
-pub(crate) use describe::{SIGMA_MM, describe_measured};
 pub use export::{Export, export};
 pub(crate) use patches::MovedOrigin;
 pub use read::Robot;
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
-    describe::HELD_OUT,
+    describe::{HELD_OUT, describe_measured},
     export::export_with_links,
     mounted::{MountedLink, mounted_links},
     yaml::{YamlFormat, joint_origins, yaml},

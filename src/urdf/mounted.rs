@@ -2,7 +2,7 @@
 
 use super::branch::Branch;
 use super::patches::Patches;
-use super::read::Kind;
+use super::read::{Kind, Robot};
 use crate::mechanics::Arm;
 use crate::model::Model;
 use crate::problem::{JointKind, Problem};
@@ -37,7 +37,7 @@ pub fn mounted_links(problem: &Problem, model: &Model, x: &[f64]) -> Vec<Mounted
 }
 
 /// Adds a link with a fixed joint for each of the `mounted`. If the file has the link on the same
-/// parent, the origin of its joint is changed instead. Returns the names of the links that the file
+/// parent, or behind further fixed joints, the origin of its joint is changed instead. Returns the names of the links that the file
 /// has elsewhere, which stay as they are. The first of the branches ends at the tip.
 pub(super) fn mount(
     patches: &mut Patches,
@@ -54,17 +54,32 @@ pub(super) fn mount(
             patches.append_link(link, name, &origin);
             continue;
         };
-        let joint = robot.joints.iter().position(|joint| {
-            joint.child == index && joint.parent == parent && joint.kind == Kind::Fixed
-        });
         let is_in_chain =
             |joint: &usize| branches.iter().any(|branch| branch.chain.joints.contains(joint));
-        match joint.filter(|joint| !is_in_chain(joint)) {
-            Some(joint) => patches.set_origin(joint, &origin),
+        let path = fixed_joints(robot, parent, index).unwrap_or_default();
+        match path.split_last().filter(|_| !path.iter().any(is_in_chain)) {
+            Some((&last, before)) => {
+                let before = patches.through(before);
+                patches.set_origin(last, &before.inverse().compose(&origin));
+            }
             None => elsewhere.push(link.clone()),
         }
     }
     elsewhere
+}
+
+/// Returns the indices of the fixed joints that lead from one link down to another; `None` if a
+/// joint between them moves, or if the second is not below the first.
+fn fixed_joints(robot: &Robot, from: usize, to: usize) -> Option<Vec<usize>> {
+    let (mut path, mut at) = (Vec::new(), to);
+    while at != from && path.len() < robot.joints.len() {
+        let above = robot.joints.iter().position(|joint| joint.child == at)?;
+        let joint = robot.joints.get(above).filter(|joint| joint.kind == Kind::Fixed)?;
+        path.push(above);
+        at = joint.parent;
+    }
+    path.reverse();
+    (at == from).then_some(path)
 }
 
 /// Returns the index of the link that moves with frame `carrier` of the problem, and that frame in

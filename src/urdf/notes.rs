@@ -14,11 +14,18 @@ const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 /// Maximum plausible mass of a link \[kg\].
 const MAX_PLAUSIBLE_MASS: f64 = 1000.0;
 
-/// Returns the notes about a chain and about joints outside it.
-pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
+/// Smallest number of moving joints of another branch at which it is one to calibrate, not a
+/// gripper.
+const MIN_BRANCH_JOINTS: usize = 2;
+
+/// Returns the notes about a chain, the `further` ones of a tree, and about joints outside them.
+pub(super) fn of_chain(chain: &Chain, further: &[Chain]) -> Vec<String> {
+    let mut indices = chain.joints.clone();
+    indices.extend(further.iter().flat_map(|branch| &branch.joints));
     let joints: Vec<&Joint> =
-        chain.joints.iter().filter_map(|&index| chain.robot.joints.get(index)).collect();
+        indices.iter().filter_map(|&index| chain.robot.joints.get(index)).collect();
     let mut notes: Vec<String> = chosen_tip(chain).into_iter().chain(moving_end(chain)).collect();
+    notes.extend(other_branch(chain, &indices).filter(|_| further.is_empty()));
     notes.extend(right_angles(&joints));
     notes.extend(joints.iter().filter_map(|joint| angle_in_degrees(joint)));
     notes.extend(joints.iter().filter_map(|joint| length_in_millimetres(joint)));
@@ -26,7 +33,7 @@ pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
     notes.extend(mass_in_grams(chain));
     notes.extend(joints.iter().filter_map(|joint| unlimited_slide(joint)));
     let beside =
-        chain.robot.joints.iter().enumerate().filter(|(index, _)| !chain.joints.contains(index));
+        chain.robot.joints.iter().enumerate().filter(|(index, _)| !indices.contains(index));
     notes.extend(beside.filter_map(|(_, joint)| {
         let (_, kind) = joint.broken_mimic.as_ref()?;
         Some(format!(
@@ -48,6 +55,32 @@ fn chosen_tip(chain: &Chain) -> Option<String> {
             others.join(", ")
         )
     })
+}
+
+/// Returns a note if another branch leaves the joints of the chain and moves by itself: the link at
+/// its end with the most joints.
+fn other_branch(chain: &Chain, joints: &[usize]) -> Option<String> {
+    let robot = chain.robot;
+    let above = |link: usize| {
+        let mut above = robot.joints.iter().enumerate().filter(move |(_, of)| of.child == link);
+        above.next().filter(|(index, _)| !joints.contains(index)).map(|(_, joint)| joint)
+    };
+    let moving = |leaf: usize| {
+        let path = std::iter::successors(above(leaf), |joint| above(joint.parent));
+        path.filter(|joint| joint.kind != Kind::Fixed && joint.mimic.is_none()).count()
+    };
+    let is_leaf = |link: &usize| !robot.joints.iter().any(|joint| joint.parent == *link);
+    let leaves = (0..robot.links.len()).filter(is_leaf).map(|leaf| (moving(leaf), leaf));
+    let (_, leaf) = leaves
+        .filter(|(moving, _)| *moving >= MIN_BRANCH_JOINTS)
+        .max_by_key(|&(moving, leaf)| (moving, usize::MAX - leaf))?;
+    Some(format!(
+        "{} moves beside this chain, with frames of the common joints that differ from those of a \
+         chain of its own: for both in one problem, --tip {} --tip {}",
+        robot.link_name(leaf),
+        chain.ends().1,
+        robot.link_name(leaf)
+    ))
 }
 
 /// Returns a note if no fixed joint follows the last moving one.

@@ -10,7 +10,7 @@ use crate::cameras::{measured_with, split};
 use crate::common::arms::parse;
 use crate::common::made::model_of;
 use crate::common::program::{Folder, items, number};
-use crate::common::reading::read_table;
+use crate::common::reading::{assert_says, read_table, table_error};
 
 /// Arm with a camera, and its identified parameters, from which images are simulated.
 struct CameraBench {
@@ -121,6 +121,16 @@ fn a_few_images_are_not_judged_by_the_number_of_their_points() {
         let open = found.findings.iter().filter(|of| of.code == FindingCode::NotToldApart);
         assert!(open.into_iter().all(|of| of.word("what") != Some("scale")), "{images}");
     }
+}
+
+#[test]
+fn pixels_beyond_any_sensor_are_refused() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let problem = parse(&std::fs::read_to_string(folder.join("problem.toml")).unwrap());
+    let table = std::fs::read_to_string(folder.join("data.csv")).unwrap();
+    let absurd = table.replacen("784.4718", "1e9", 1);
+    let error = table_error(&problem, &absurd);
+    assert_says(&error, &["rows.csv:2", "1000000000.0 px is no place in an image"]);
 }
 
 /// Truth of the bench arm with a camera on its tip and a board in front of it.

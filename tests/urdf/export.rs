@@ -201,6 +201,19 @@ fn cameras_and_markers_on_the_arm_become_links() {
     assert!(exported.moved.iter().any(|origin| origin.joint == "eye_mount"));
     let moved = Robot::parse(&exported.text, std::path::Path::new("moved.urdf")).unwrap();
     assert_links(&moved, "world", &mounted, (&problem, &configurations, &x));
+    // A bracket between the arm and the link of its camera stays.
+    let bracket = "<parent link=\"bracket\"/><child link=\"eye_optical_frame\"/><origin \
+                   xyz=\"1 2 3\"/></joint>\n<link name=\"bracket\"/><joint name=\"stay\" \
+                   type=\"fixed\"><parent link=\"upper\"/><child link=\"bracket\"/><origin \
+                   xyz=\"0.1 0 0\" rpy=\"0 0 1\"/></joint>";
+    let old = "<parent link=\"upper\"/><child link=\"eye_optical_frame\"/></joint>";
+    let held = Robot::parse(&text.replace(old, bracket), std::path::Path::new("odd.urdf")).unwrap();
+    let chain = Chain::new(&held, None, Some("tool")).unwrap();
+    let exported = export_with_links(&chain, &problem, &model.arm(|k| x[k]), &mounted).unwrap();
+    let origins = &exported.moved;
+    assert!(exported.elsewhere.is_empty() && !origins.iter().any(|of| of.joint == "stay"));
+    let moved = Robot::parse(&exported.text, std::path::Path::new("moved.urdf")).unwrap();
+    assert_links(&moved, "world", &mounted, (&problem, &configurations, &x));
     // The camera on the upper arm cannot move to another parent.
     let other = text.replace("<parent link=\"upper\"/><child", "<parent link=\"fore\"/><child");
     let other = Robot::parse(&other, std::path::Path::new("odd.urdf")).unwrap();

@@ -13,6 +13,7 @@ mod export;
 mod forms;
 mod init;
 mod public;
+mod tree;
 
 use crate::common::arms::parse;
 use common::made::model_of;

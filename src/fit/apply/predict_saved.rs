@@ -245,6 +245,7 @@ pub fn predict(
             .error(InputErrorKind::PointBehindCamera {
                 fits: None,
                 miss: None,
+                few: 0,
                 readings: Vec::new(),
             })
             .into());

@@ -189,7 +189,7 @@ fn tool_entry(
 
 /// Returns the words for exchanged coordinates or another unit of the declared target, with which
 /// it is near the fitted one \[m\].
-fn mistaken_target(declared: Vector3<f64>, fitted: Vector3<f64>) -> Option<String> {
+pub(super) fn mistaken_target(declared: Vector3<f64>, fitted: Vector3<f64>) -> Option<String> {
     let limit = MAX_TARGET_MISMATCH * (fitted - declared).norm();
     let exchanged = [(0, 1), (0, 2), (1, 2)].into_iter().find(|&(first, second)| {
         let mut meant = declared;

@@ -189,8 +189,9 @@ finding_codes! {
          scatter is more than 31 times their declared σ.",
         "check the convention of the orientation columns and their frames";
     LensContradicted: Error "lens-contradicted" ["parameters", "before", "after"]
-        "Held intrinsics of a camera cause most of the misfit: with them free it falls by three \
-         quarters of what exceeds noise, and beyond chance (F test, probability below 0.0001).",
+        "Held intrinsics of a camera cause most of the misfit, or of that within the views: with \
+         them free it falls by three quarters of what exceeds noise, and beyond chance (F test, \
+         probability below 0.0001).",
         "free them in [parameters] (\"camera*.f*\" = { free = true } …), or declare better ones";
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide \

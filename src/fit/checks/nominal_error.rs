@@ -63,6 +63,16 @@ impl CheckedFit<'_> {
         self.fitting.model.parameters.iter().any(is_of_base)
     }
 
+    /// Returns true if no coordinate of one of the bases is a free parameter.
+    pub fn is_a_base_held(&self) -> bool {
+        let parameters = &self.fitting.model.parameters;
+        let is_free = |base: usize| {
+            let is_of_base = |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { base: of, .. } if of == base);
+            parameters.iter().any(is_of_base)
+        };
+        !(0..self.fitting.placement.bases.len()).all(is_free)
+    }
+
     /// Returns true if no coordinate of a target is a free parameter.
     pub fn is_target_held(&self) -> bool {
         let is_of_target =

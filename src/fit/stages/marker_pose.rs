@@ -10,7 +10,9 @@ use crate::observation::{FixtureValues, slopes_of_pixel};
 /// Largest ratio of the smallest to the largest spread of points at which they count as coplanar.
 const MAX_COPLANAR_RATIO: f64 = 1e-6;
 /// Minimum number of points from which a pose is computed: coplanar points, and points in space.
-const MIN_POINTS: [usize; 2] = [4, 6];
+const MIN_POINTS: [usize; 2] = [MIN_POINTS_OF_POSE, 6];
+/// Minimum number of points of any marker from which a pose is computed.
+pub(super) const MIN_POINTS_OF_POSE: usize = 4;
 /// Number of Gauss–Newton steps that refine the linear pose.
 const REFINEMENT_STEPS: usize = 10;
 

@@ -26,6 +26,10 @@ const MIN_MISS: f64 = 10.0;
 /// which they are counted so.
 const MAX_OTHER_RATIO: f64 = 0.2;
 
+/// Largest rms error of views by themselves \[px\] that counts as such; beyond it, and where the
+/// points fit no pose, it is taken as this.
+const MAX_MISS: f64 = 100.0;
+
 /// Median rms errors of views by themselves \[px\].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SingleViews {
@@ -71,6 +75,17 @@ impl SingleViews {
         Some(Self { declared, transposed: errors(true)? })
     }
 
+    /// Returns the largest number of points of one camera and marker in one configuration among
+    /// `poses`.
+    pub fn most_points(poses: &[Pose]) -> usize {
+        let mut counts: BTreeMap<_, usize> = BTreeMap::new();
+        for pose in poses {
+            let bits: Vec<u64> = pose.setup.configuration.iter().map(|q| q.to_bits()).collect();
+            *counts.entry((pose.observation.fixtures(), pose.base, bits)).or_default() += 1;
+        }
+        counts.into_values().max().unwrap_or(0)
+    }
+
     /// Returns true if the points of most views fit no pose of the marker.
     pub fn miss_the_marker(self) -> bool {
         self.declared > MIN_MISS
@@ -79,7 +94,7 @@ impl SingleViews {
     /// Returns true if the points of most views fit the marker once its grid is counted along its
     /// other side.
     pub fn are_transposed(self) -> bool {
-        self.miss_the_marker() && self.transposed < MAX_OTHER_RATIO * self.declared
+        self.miss_the_marker() && self.transposed < MAX_OTHER_RATIO * self.declared.min(MAX_MISS)
     }
 }
 

@@ -7,6 +7,7 @@ use nalgebra::DVector;
 
 use super::fitting::Fitting;
 use super::fixture_location::undecided_views;
+use super::marker_pose::MIN_POINTS_OF_POSE;
 use super::single_views::SingleViews;
 use crate::error::{InputError, InputErrorKind};
 use crate::observation::Needs;
@@ -70,7 +71,9 @@ impl Fitting<'_> {
         let views = SingleViews::of(self.model, &self.poses(&alike), x);
         let fits = views.map(|views| !views.miss_the_marker());
         let miss = views.map(|views| views.declared);
-        let kind = InputErrorKind::PointBehindCamera { fits, miss, readings: Vec::new() };
+        let most = SingleViews::most_points(&self.poses(&alike));
+        let few = if most < MIN_POINTS_OF_POSE { most } else { 0 };
+        let kind = InputErrorKind::PointBehindCamera { fits, miss, few, readings: Vec::new() };
         Some(self.measurements.location(row).error(kind))
     }
 

@@ -10,6 +10,7 @@ mod candidates;
 mod chosen_rows;
 mod commands;
 mod explanation;
+mod held_places;
 mod images;
 mod known_arm;
 mod masses;

@@ -81,6 +81,8 @@ pub(super) struct Outcome {
     pub rms: f64,
     /// Fitted size of the misreading; `None` without a full fit, or if the misreading has no size.
     size: Option<f64>,
+    /// Words on the base or target that a full fit found elsewhere than declared; otherwise empty.
+    place: String,
     /// Cross-validation misfit of a full fit; `None` without one.
     left_out: Option<LeftOutMisfit>,
     /// True if no parameter of the arm deviates far beyond its prior; always true without a full
@@ -130,7 +132,7 @@ pub(super) fn explanations(fit: &CheckedFit) -> Explanations {
         tested.extend(pairs.map(|axes| Misreading::Mirrored { axes: Some(axes) }));
     }
     // A base that is only a little off is no misreading.
-    let is_base_held = is_position && !fit.is_base_free() && is_nominal_far_off(fit);
+    let is_base_held = is_position && fit.is_a_base_held() && is_nominal_far_off(fit);
     tested.extend(is_base_held.then_some(Misreading::HeldBase));
     // A target that is declared far from its frame may be in millimetres, which another misreading
     // covers.
@@ -259,7 +261,7 @@ impl<'a> Trial<'a> {
             if misreading.is_minute() {
                 return None;
             }
-            let Outcome { rms, size, left_out, is_within_priors } =
+            let Outcome { rms, size, place, left_out, is_within_priors } =
                 self.outcome(misreading, true)?;
             // A negative ratio means that the joint turns against its command, and one of 1 is no
             // misreading.
@@ -283,7 +285,7 @@ impl<'a> Trial<'a> {
                 return None;
             }
             Some(Explanation {
-                words: misreading.described(size, self.problem),
+                words: misreading.described(size, self.problem) + &place,
                 rms,
                 effect: size.and_then(|size| misreading.expressed(size)),
                 left_out: left_out?,
@@ -306,7 +308,9 @@ impl<'a> Trial<'a> {
             if !is_fitted {
                 let registered = fitting.registered_to(TRIAL_TOLERANCE).ok()?;
                 let rms = self.error(fitting, rows, &registered);
-                let outcome = Outcome { rms, size: None, left_out: None, is_within_priors: true };
+                let place = String::new();
+                let outcome =
+                    Outcome { rms, size: None, place, left_out: None, is_within_priors: true };
                 // An arm that a misreading shrinks to a point misses points by their spread, which
                 // explains nothing, however small the spread is.
                 let points = &fitting.measurements.positions;
@@ -330,7 +334,8 @@ impl<'a> Trial<'a> {
             let is_within_priors = !fitted.any(|(parameter, x)| {
                 prior_sigmas(parameter, *x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
             });
-            rms.is_finite().then_some(Outcome { rms, size, left_out, is_within_priors })
+            let place = misreading.found_place(self.problem, model, x);
+            rms.is_finite().then_some(Outcome { rms, size, place, left_out, is_within_priors })
         })
     }
 

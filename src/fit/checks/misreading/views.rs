@@ -91,13 +91,13 @@ pub(in crate::fit) fn with_readings(
     error: InputError,
 ) -> InputError {
     match *error.kind {
-        InputErrorKind::PointBehindCamera { fits, miss, .. }
+        InputErrorKind::PointBehindCamera { fits, miss, few, .. }
             if is_of_views(fitting.measurements) =>
         {
             let near = near_in_views(fitting, problem).near;
             let readings = near.iter().take(MAX_FITTED).map(|found| found.described(None, problem));
             let readings = readings.collect();
-            error.location.error(InputErrorKind::PointBehindCamera { fits, miss, readings })
+            error.location.error(InputErrorKind::PointBehindCamera { fits, miss, few, readings })
         }
         kind => error.location.error(kind),
     }
