@@ -334,6 +334,8 @@ pub enum TableErrorKind {
     JointsFromZero,
     #[error("\"{value}\" is not a number")]
     NotANumber { value: String },
+    #[error("\"{value}\" is a sign without a number; write {value}1, or 0 for none")]
+    SignAlone { value: String },
     #[error("\"{value}\" contains {found}; {remedy}")]
     Typographic { value: String, found: String, remedy: &'static str },
     #[error(
@@ -380,8 +382,9 @@ pub enum TableErrorKind {
     )]
     JoinedWithItself { path: PathBuf },
     #[error(
-        "\"{word}\" is neither identification nor validation, the two words of this column{}",
-        is_it_rather("", *meant)
+        "\"{word}\" is neither identification nor validation, the two words of this column{}{}",
+        is_it_rather("", *meant),
+        if *is_session { "; to hold out a session write held_out = { session = \"…\" } with its name" } else { "" }
     )]
-    UnknownSplit { word: String, meant: Option<&'static str> },
+    UnknownSplit { word: String, meant: Option<&'static str>, is_session: bool },
 }

@@ -30,6 +30,9 @@ pub(super) fn other_notation(word: &str) -> Option<TableErrorKind> {
     let value = shortened(word, 40);
     let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     let unsigned = word.trim_start_matches(['-', '+']);
+    if unsigned.is_empty() && word.len() == 1 {
+        return Some(TableErrorKind::SignAlone { value });
+    }
     let whole = unsigned.split(['.', ',']).next().unwrap_or_default();
     let mut groups = whole.split([' ', '\u{a0}', '\u{2009}', '\u{202f}', '\'']);
     let first = groups.next().is_some_and(|first| first.len() <= 3 && is_digits(first));

@@ -407,7 +407,8 @@ fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
                 "identification" | "ident" | "train" | "training" | "fit" => Some("identification"),
                 _ => None,
             };
-            let kind = TableErrorKind::UnknownSplit { word: shortened(word), meant };
+            let is_session = table.name_of(place) == "session";
+            let kind = TableErrorKind::UnknownSplit { word: shortened(word), meant, is_session };
             Err(table.cell_error(place, kind))
         }
     }

@@ -43,6 +43,15 @@ fn identify_prints_a_table_and_writes_the_estimate() {
     }
 }
 
+#[test]
+fn a_rule_that_holds_all_that_others_free_is_not_met() {
+    let folder = Folder::with_lunar_sampler();
+    folder
+        .map("problem.toml", |text| text.replace("\n[data]", "\n\"*\" = { fixed = true }\n[data]"));
+    let run = folder.flexcal("identify .").code(1);
+    assert_contains(&run.stdout, &["No parameter is free", "nominal arm is judged"]);
+}
+
 /// Writes arms with measurements, given or simulated; returns problem and data of each.
 fn arms(folder: &Folder) -> Vec<[String; 2]> {
     let cases = path("tests/cases").display().to_string();
