@@ -63,7 +63,7 @@ pub(super) fn other_gravity(
         let options = declared.warm_started_options(state.options, true);
         let few = || options.max_steps.unwrap_or(u64::MAX).min(MAX_PROVISIONAL_STEPS);
         let max_steps = if provisional { Some(few()) } else { options.max_steps };
-        declared.fit_other(problem, data, &Options { provisional, max_steps, ..options }).ok()
+        declared.fit_other(problem, data, &Options { max_steps, provisional, ..options }).ok()
     };
     let as_declared = declared.problem.gravity;
     let first = with(as_declared, &compliances, true)?;
