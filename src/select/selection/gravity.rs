@@ -56,7 +56,7 @@ pub(super) fn other_gravity(
         let problem = Problem { gravity, ..state.problem(declared, &effects) };
         let options = declared.warm_started_options(state.options, true);
         let max_steps = if provisional { Some(MAX_PROVISIONAL_STEPS) } else { options.max_steps };
-        declared.fit_other(problem, data, &Options { provisional, max_steps, ..options }).ok()
+        declared.fit_other(problem, data, &Options { max_steps, provisional, ..options }).ok()
     };
     let ln_odds = |fitted: &Fitted, known: &Fitted| {
         let gain = LeftOutGain::new(fitted, known, data)?;
