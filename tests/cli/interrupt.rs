@@ -173,8 +173,9 @@ fn an_interrupted_loop_replaces_no_finished_one() {
 #[test]
 fn every_command_says_that_it_was_interrupted() {
     let folder = measured();
-    for command in ["plan . --poses 200", "simulate . --truth TRUTH.toml --poses 1000000"] {
-        let mut run = Terminal::run(&folder.path(""), &format!("{command} --out early"));
+    for command in ["plan . --poses 200", "simulate . --poses 1000000 --seed 1"] {
+        let arguments = format!("{command} --truth TRUTH.toml --out early");
+        let mut run = Terminal::run(&folder.path(""), &arguments);
         run.wait_for_handler();
         run.interrupt();
         let (status, shown) = run.end();

@@ -68,11 +68,21 @@
   const triples = (list) => Array.from({ length: Math.floor(list.length / 3) }, (_, k) => list.slice(3 * k, 3 * k + 3));
   const places = data.poses.map((pose) => pose.position).concat(data.poses.flatMap((pose) => triples(pose.rigid || [])));
   const ends = [0, 1, 2].map((k) => [Math.min(...places.map((p) => p[k])), Math.max(...places.map((p) => p[k]))]);
-  const middle = ends.map(([low, high]) => (low + high) / 2);
-  const reach = Math.max(1, ...places.map((p) => Math.hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])));
-  /* Height of the floor, and side of its squares: 1, 2 or 5 times a power of ten [mm]. */
+  /* Height of the floor [mm]. */
   const bodies = data.poses.flatMap((pose) => pose.rigid || []);
   const ground = Math.min(ends[2][0], ...bodies.filter((_, k) => k % 3 === 2));
+  /* The measuring frame is in view unless it is far away. */
+  const away = Math.max(...ends.map(([low, high]) => Math.max(low, -high)));
+  if (away < Math.max(...ends.map(([low, high]) => high - low))) {
+    const tip = 0.15 * Math.hypot(...ends.map(([low, high]) => high - low));
+    for (const place of [[0, 0, 0], [tip, 0, 0], [0, tip, 0], [0, 0, tip]]) {
+      places.push(place);
+      ends.forEach((end, k) => { end[0] = Math.min(end[0], place[k]); end[1] = Math.max(end[1], place[k]); });
+    }
+  }
+  const middle = ends.map(([low, high]) => (low + high) / 2);
+  const reach = Math.max(1, ...places.map((p) => Math.hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])));
+  /* Side of the squares of the floor: 1, 2 or 5 times a power of ten [mm]. */
   const decade = 10 ** Math.floor(Math.log10(reach / 3));
   const square = decade * [1, 2, 5, 10].filter((k) => k * decade <= reach / 3).pop();
   const most = Math.max(...data.poses.flatMap((pose) => (pose.give ? pose.give.map(Math.abs) : [0])), 0);
