@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexcal::fit::{FindingCode, Identification, SavedEstimate, Strategy};
+use flexcal::fit::{Estimate, FindingCode, Identification, SavedEstimate, Strategy};
 use flexcal::problem::{Fixture, HeldOut, PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
@@ -52,7 +52,8 @@ pub fn after_fit(
     let file = common.problem_file().display().to_string();
     let to_apply = |what: &str| {
         if measures_no_position(problem) {
-            return to_export(common, problem, estimate);
+            let open = open_camera(found);
+            return open.unwrap_or_else(|| to_export(common, problem, estimate));
         }
         let [problem, estimate] = [common.problem(), estimate].map(shell_word);
         format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv {what}")
@@ -387,6 +388,21 @@ pub fn strategy_argument(estimate: &SavedEstimate) -> String {
 fn measures_no_position(problem: &Problem) -> bool {
     let has_camera = problem.fixtures.iter().any(|fixture| fixture.kind.word() == "camera");
     has_camera && problem.data.position_sigma.is_none()
+}
+
+/// States what to do about the first camera with a coordinate that the rows do not determine; `None`
+/// if they determine all that was fitted.
+fn open_camera(found: &Identification) -> Option<String> {
+    let is_open = |estimate: &&Estimate| {
+        estimate.std_error.is_none()
+            && estimate.name.starts_with("camera[")
+            && found.unknowns.contains(&estimate.name)
+    };
+    let name = &found.estimates.iter().find(is_open)?.name;
+    Some(format!(
+        "hold {name} or declare the place of the camera or of the marker (at_m, rotation_deg), \
+         because these views do not determine it; or add views with the camera turned about two axes"
+    ))
 }
 
 /// Returns the command that writes an estimate into the URDF of the arm, or the camera of it if the

@@ -152,6 +152,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     check_geometry(arguments, is_rigid)?;
     let problem = Problem::read(&arguments.problem)?;
     let estimates = arguments.trust.read(&arguments.estimate)?;
+    if camera.is_some_and(|(form, _)| form != code::CameraFormat::Ros) {
+        check_poses_of_cameras(&problem, &estimates, arguments.camera.as_deref())?;
+    }
     if matches!(arguments.format, Some(Format::C)) {
         return write_c(arguments, &problem, &estimates);
     }
@@ -269,6 +272,31 @@ struct Rendered {
     name: PathBuf,
     /// Links that are mounted on another link in the URDF than in the problem.
     elsewhere: Vec<String>,
+}
+
+/// Checks that the estimate determines the poses of the cameras that are written: of the `chosen` one,
+/// or of all.
+fn check_poses_of_cameras(
+    problem: &Problem,
+    estimates: &SavedEstimate,
+    chosen: Option<&str>,
+) -> Result<(), code::ExportError> {
+    for fixture in problem.fixtures.iter().filter(|fixture| fixture.kind.word() == "camera") {
+        let name = &fixture.name;
+        if chosen.is_some_and(|chosen| chosen != name) {
+            continue;
+        }
+        let names = ["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("camera[{name}].{axis}"));
+        let open = estimates.undetermined(&names);
+        if !open.is_empty() {
+            let axes = open.iter().filter_map(|name| name.rsplit('.').next());
+            return Err(code::ExportError::PoseOpen {
+                camera: name.clone(),
+                coordinates: axes.collect::<Vec<_>>().join(", "),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Formats the arm or a camera in the format of the arguments. Adds the table of standard

@@ -8,6 +8,18 @@ use crate::measurement::DatasetError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
+    /// The measurements do not determine the pose of a camera.
+    #[error(
+        "the measurements do not determine {coordinates} of camera \"{camera}\", so that its pose in \
+         the file would be arbitrary; declare the place of the camera or of the marker (at_m, \
+         rotation_deg), or add views with the camera turned about two axes"
+    )]
+    PoseOpen {
+        /// Name of the camera.
+        camera: String,
+        /// Names of the coordinates.
+        coordinates: String,
+    },
     /// A law depends on earlier poses.
     #[error(
         "{formula} depends on earlier poses, which the generated code does not keep; identify \

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use super::saved_estimate_error::{
-    FORMAT, Format, MAX_FILE_MIB, SavedEstimateError, missing, not_an_estimate,
+    DifferingPart, FORMAT, Format, MAX_FILE_MIB, SavedEstimateError, missing, not_an_estimate,
 };
 use super::saved_posterior::SavedPosterior;
 use crate::error::{binary_format, one_line};
@@ -118,6 +118,16 @@ struct RemainderEntry {
 }
 
 impl SavedEstimate {
+    /// Returns those of the parameters `names` that were fitted and have no standard error, because
+    /// the measurements do not determine them.
+    #[doc(hidden)]
+    pub fn undetermined<'a>(&self, names: &'a [String]) -> Vec<&'a str> {
+        let is_open = |name: &&String| {
+            self.entry(name).is_some_and(|of| of.fitted == Some(true) && of.std_error.is_none())
+        };
+        names.iter().filter(is_open).map(String::as_str).collect()
+    }
+
     /// Returns a copy of the estimate without the fitted parameters for whose name `is_left_out`
     /// returns true.
     pub(crate) fn without_fitted(&self, is_left_out: impl Fn(&str) -> bool) -> Self {
@@ -487,12 +497,4 @@ fn is_other_placement(name: &str, model: &Model) -> bool {
             || model.parameters.iter().any(|parameter| parameter.name.starts_with(&bracketed));
         name.starts_with(&bracketed) || name.starts_with(&single) && has_names()
     })
-}
-
-/// Part of the declared arm in which two estimates differ.
-pub(crate) struct DifferingPart {
-    /// Name of the part as users read it.
-    pub name: String,
-    /// True for each of the two estimates whose arm declares the part.
-    pub is_declared: [bool; 2],
 }

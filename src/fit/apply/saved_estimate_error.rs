@@ -145,3 +145,11 @@ pub enum SavedEstimateError {
     #[error("{}: not UTF-8 text, so no estimate.json", file.display())]
     NotUtf8 { file: PathBuf },
 }
+
+/// Part of the declared arm in which two estimates differ.
+pub(crate) struct DifferingPart {
+    /// Name of the part as users read it.
+    pub name: String,
+    /// True for each of the two estimates whose arm declares the part.
+    pub is_declared: [bool; 2],
+}
