@@ -96,9 +96,10 @@ fn install() -> Stop {
 /// Handles interrupts, and requests to end (SIGTERM) in the same way. Must be called before other
 /// threads start: they inherit the blocked signal and leave it to the thread that waits for it.
 pub fn watch() {
-    install();
+    // The thread that waits for interrupts inherits the blocked SIGTERM, too.
     #[cfg(unix)]
     watch_termination();
+    install();
 }
 
 /// Makes requests to end (SIGTERM) act as interrupts do.

@@ -219,8 +219,7 @@ impl PredictionAccuracy {
             let [rms, max] = [errors.rms.norm, errors.max.norm].map(|of| number(of * 1e3, 2));
             kept = match &uncertainty.test {
                 Some(test) => format!(
-                    " This bound allows for the misfit too: {} of {} {HELD_OUT} {} ({} by chance); \
-                     the largest error is {max} mm.",
+                    " {} of {} {HELD_OUT} {} ({} by chance); the largest error is {max} mm.",
                     test.beyond(),
                     test.of,
                     exceed(test.beyond()),
