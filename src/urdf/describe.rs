@@ -13,6 +13,7 @@ use super::free::distinguishable_parameters;
 use super::lines::Step;
 use super::notes;
 use super::read::Kind;
+use super::row::Row;
 use crate::error::{InputError, UrdfErrorKind};
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
 use crate::problem::{Joint, Problem, quoted};
@@ -46,30 +47,6 @@ pub struct Description {
     pub text: String,
     /// Notes for the user about assumptions and ignored parts.
     pub notes: Vec<String>,
-}
-
-/// Table `[[joint]]` of the problem that is written.
-#[derive(Default)]
-pub(super) struct Row {
-    name: String,
-    /// Index of the moving joint in the robot; `None` for a fixed joint.
-    pub joint: Option<usize>,
-    /// Number of the joint on which the first row of a further chain stands, from 1; 0 for the base.
-    parent: Option<usize>,
-    /// Frame of the row with all joints at zero, in the frame of the base.
-    pub frame: Frame<f64>,
-    /// Kind of the joint as in problem files: `revolute`, `prismatic` or `fixed`.
-    kind: &'static str,
-    /// Placement by xyz and rpy; `None` for moving joints.
-    placement: Option<Frame<f64>>,
-    /// Index in the robot of the joint that a mimic joint follows, and the factor.
-    mimic: Option<(usize, f64)>,
-    /// Joint parameters α \[rad\], a \[m\], θ \[rad\], d \[m\], β \[rad\].
-    numbers: [f64; 5],
-    /// Limits of the command \[rad\] or \[m\]; `None` for fixed and mimic joints.
-    limits: Option<(f64, f64)>,
-    /// Name, mass \[kg\] and centre of mass \[m\], joint frame, of each body.
-    bodies: Vec<(String, f64, Vector3<f64>)>,
 }
 
 /// Converts a chain to a problem whose measurement file does not exist yet.
@@ -227,7 +204,7 @@ fn rows(chain: &Chain, fork: &Fork, notes: &mut Vec<String>) -> Vec<Row> {
     }
     let mut frame = fork.frame;
     for row in &mut rows {
-        frame = advanced(&frame, row);
+        frame = row.advanced(&frame);
         row.frame = frame;
     }
     let (masses, beside) = carried_masses(chain, &fork.beside);
@@ -242,18 +219,6 @@ fn rows(chain: &Chain, fork: &Fork, notes: &mut Vec<String>) -> Vec<Row> {
         notes.push(format!("masses beside the chain are taken with {} at zero", beside.join(", ")));
     }
     rows
-}
-
-/// Returns `frame` transformed by a row at q = 0.
-fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
-    let mut frame = row.placement.as_ref().map_or(*frame, |placement| frame.compose(placement));
-    let [alpha, a, theta, d, beta] = row.numbers;
-    frame.rotate_x(alpha.sin_cos());
-    frame.translate_x(a);
-    frame.rotate_z(theta.sin_cos());
-    frame.translate_z(d);
-    frame.rotate_y(beta.sin_cos());
-    frame
 }
 
 /// Returns the robot's name, changed so that it is a valid folder name; `arm` if nothing is left.

@@ -1,7 +1,7 @@
 //! Place where the chain to a further tip leaves the joints of the chains before it.
 
 use super::chain::{Chain, Stage};
-use super::describe::Row;
+use super::row::Row;
 use crate::spatial::Frame;
 
 /// Place from which the rows of a chain begin: the base, or a joint that an earlier chain moves too.

@@ -20,6 +20,7 @@ mod notes;
 mod number;
 mod patches;
 mod read;
+mod row;
 mod sheet;
 mod yaml;
 

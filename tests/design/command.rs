@@ -60,7 +60,7 @@ fn a_plan_can_be_checked_and_measured() {
     );
     assert_eq!(csv.lines().count(), 21);
     // The page lists the loads of each pose, too.
-    assert_contains(&folder.read("plan.html"), &["payload_kg ", "hoist_N "]);
+    assert_contains(&folder.read("plan.html"), &["payload_kg<", "hoist_N<"]);
     // Every pose is one of the candidates.
     for line in csv.lines().skip(1) {
         let pose = line.splitn(3, ',').nth(2).unwrap();

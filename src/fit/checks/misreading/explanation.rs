@@ -1,7 +1,6 @@
 //! Misreadings that explain why an arm does not fit its measurements.
 
 use super::Misreading;
-use super::search::MAX_NAMED;
 use crate::problem::{Effect, ParameterRule, Problem};
 
 /// Misreading with whose correction a full fit explains the measurements.
@@ -103,6 +102,8 @@ impl Explanations {
     }
 }
 
+/// Maximum number of misreadings that the text of the finding names.
+const MAX_NAMED: usize = 4;
 /// Number of words beyond which a text names no third misreading.
 const MAX_NAMED_WORDS: usize = 30;
 

@@ -66,8 +66,6 @@ pub(in crate::fit) const MAX_NOISE_SIGMAS: f64 = 5.0;
 /// Largest ratio of the error with a misreading undone to that as read, at which the misreading is
 /// sure although more than noise is left. Another cause that acts alike hardly removes as much.
 pub(in crate::fit) const MAX_CLEAR_RATIO: f64 = 0.02;
-/// Maximum number of misreadings that the text of the finding names.
-pub(super) const MAX_NAMED: usize = 4;
 /// Relative reduction of the cost by one step below which a registration without a full fit ends.
 /// The error is then accurate enough for a comparison at [`MAX_RATIO_TO_BEST`].
 const TRIAL_TOLERANCE: f64 = 1e-4;
