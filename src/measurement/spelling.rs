@@ -4,6 +4,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::table::shortened;
 
+/// Smallest number of names that are paired by their numbers alone; fewer agree by chance.
+const MIN_NUMBERED: usize = 4;
+
 /// Returns a name in lower case, without spaces, marks and the zeros before a number.
 fn plain_name(name: &str) -> String {
     let letters: Vec<char> =
@@ -51,12 +54,13 @@ pub(super) fn usual_difference<'a>(
     let others_without = |name: &str| within(name, of_others);
     let most =
         |pairs: Vec<[&'a str; 2]>| pairs.first().copied().filter(|_| 2 * pairs.len() > names.len());
+    let by_number = || most(same_number(names, &others)).filter(|_| names.len() >= MIN_NUMBERED);
     let spelled = most(same_after([&plain_name; 2], names, &others));
     let framed = || most(same_after([&without, &others_without], names, &others));
     spelled
         .map(|pair| ("spelling", pair))
         .or_else(|| Some(("a word before or behind all names of a table", framed()?)))
-        .or_else(|| Some(("the letters about their number", most(same_number(names, &others))?)))
+        .or_else(|| Some(("the letters about their number", by_number()?)))
 }
 
 /// Returns the lengths of the beginning and of the end that all names share, up to the mark that
@@ -128,28 +132,29 @@ mod tests {
 
     #[test]
     fn names_that_differ_by_words_or_letters_are_paired() {
-        let difference = |names: [&str; 3], others: &[&'static str]| {
-            let names = names.map(str::to_owned);
+        let difference = |names: &[&str], others: &[&'static str]| {
+            let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
             usual_difference(&names, others.to_vec())
                 .map(|(what, pair)| format!("{what}: {} {}", pair[0], pair[1]))
         };
         for (names, others, expected) in [
-            (["P_1", "P_2", "P_3"], &["p01", "p02", "p9"][..], "spelling: P_1 p01"),
+            (&["P_1", "P_2", "P_3"][..], &["p01", "p02", "p9"][..], "spelling: P_1 p01"),
             (
-                ["cal_north", "cal_west", "cal_top"],
+                &["cal_north", "cal_west", "cal_top"],
                 &["West end", "North end", "East end"],
                 "a word before or behind all names of a table: cal_north North end",
             ),
             (
-                ["pose_001", "pose_002", "pose_003"],
+                &["pose_001", "pose_002", "pose_003", "pose_004"],
                 &["VIA0", "MP1", "VIA1", "MP2", "MP3"],
                 "the letters about their number: pose_001 MP1",
             ),
         ] {
             assert_eq!(difference(names, others).as_deref(), Some(expected));
         }
-        assert_eq!(difference(["a", "b", "c"], &["d", "e"]), None);
-        assert_eq!(difference(["a1", "b2", "c3"], &["d7", "e8"]), None);
+        assert_eq!(difference(&["a", "b", "c"], &["d", "e"]), None);
+        assert_eq!(difference(&["a1", "b2", "c3", "d4"], &["d7", "e8"]), None);
+        assert_eq!(difference(&["a1", "a2", "a3"], &["b1", "b2", "b3"]), None);
         assert_eq!(common_words(&["é_1", "é_2"]), [3, 0]);
         assert_eq!(common_words(&["_", "_"]), [0, 0]);
     }
