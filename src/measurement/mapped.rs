@@ -47,7 +47,7 @@ impl<'a> Names<'a> {
             ColumnSelector::File => rules.len() == 1,
         };
         if !rules.iter().any(|rule| is_foreign(&rule)) {
-            // The clocks of a joint table may need rules of their own.
+            // The clocks of a joint table may need other rules.
             let is_of_clock =
                 |rule: &&ColumnRule| table.appended_columns().is_some() && is_clock(&rule.ours);
             let unused = rules.iter().find(|rule| !has(&rule.ours) && !is_of_clock(rule));

@@ -45,8 +45,8 @@ pub(super) fn usual_difference<'a>(
     mut others: Vec<&'a str>,
 ) -> Option<(&'static str, [&'a str; 2])> {
     others.sort_unstable();
-    let own: Vec<&str> = names.iter().map(String::as_str).collect();
-    let [around, of_others] = [&own, &others].map(|names| common_words(names));
+    let named: Vec<&str> = names.iter().map(String::as_str).collect();
+    let [around, of_others] = [&named, &others].map(|names| common_words(names));
     let within = |name: &str, [before, after]: [usize; 2]| {
         plain_name(name.get(before..name.len() - after).unwrap_or(name))
     };
