@@ -419,7 +419,7 @@ pub enum InputErrorKind {
     )]
     NoEquilibrium,
     #[error(
-        "the nominal arm has no equilibrium under its loads here; the mass {name} of {mass} kg is \
+        "the nominal arm has no equilibrium under its loads here; the mass of {name}, {mass} kg, is \
          {how}: check its unit (kg)"
     )]
     HeavyMass { name: String, mass: String, how: String },

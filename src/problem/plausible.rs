@@ -115,8 +115,8 @@ const MAX_MASS_RATIO: f64 = 10.0;
 /// Largest plausible mass of one body of an arm \[kg\]. The heaviest industrial arms weigh some
 /// thousands of kilograms in all.
 const MAX_BODY_MASS: f64 = 1000.0;
-/// Largest mass of a part or of a payload with which an arm may be meant \[kg\]. The same number of
-/// grams is ten kilograms.
+/// Largest mass of a part or payload, of an arm without an equilibrium, that is not taken for one in
+/// grams \[kg\]: 10 000 g are 10 kg.
 const MAX_PLAUSIBLE_MASS: f64 = 1e4;
 /// Largest plausible size of gravity \[m/s²\]; that of Jupiter is 25.
 const MAX_GRAVITY: f64 = 30.0;
@@ -262,8 +262,9 @@ impl Problem {
     /// heavy as all others together.
     fn heavy_mass_error(&self, payload: f64) -> Option<InputErrorKind> {
         let parts = || self.joints.iter().flat_map(Joint::named_masses);
-        let mut beyond =
-            parts().chain([("payload", payload)]).filter(|(_, mass)| *mass > MAX_PLAUSIBLE_MASS);
+        let mut beyond = parts()
+            .chain([("the payload", payload)])
+            .filter(|(_, mass)| *mass > MAX_PLAUSIBLE_MASS);
         let found = |(name, mass): (&str, f64), how: String| InputErrorKind::HeavyMass {
             name: name.to_owned(),
             mass: two_digits(mass, 3),
@@ -272,7 +273,8 @@ impl Problem {
         if let Some(first) = beyond.next() {
             let how = match beyond.count() {
                 0 => "too heavy for an arm".to_owned(),
-                more => format!("too heavy for an arm, as {more} more"),
+                1 => "too heavy for an arm, and so is another one".to_owned(),
+                others => format!("too heavy for an arm, and so are {others} others"),
             };
             return Some(found(first, how));
         }
