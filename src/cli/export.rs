@@ -274,8 +274,10 @@ struct Rendered {
     elsewhere: Vec<String>,
 }
 
-/// Checks that the estimate determines the poses of the cameras that are written: of the `chosen` one,
-/// or of all.
+/// Checks that the estimate determines the pose of the `chosen` camera, or of all if none is chosen.
+///
+/// # Errors
+/// Returns an error that names the first camera with a fitted coordinate without a standard error.
 fn check_poses_of_cameras(
     problem: &Problem,
     estimates: &SavedEstimate,

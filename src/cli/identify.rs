@@ -234,5 +234,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 
 /// Returns true if a warning about the table says why the fit is not to be trusted.
 fn is_cause(kind: &WarningKind, found: &Identification) -> bool {
-    kind.refutes_table() || kind.says_that_loads_lack() && !found.is_trusted()
+    kind.refutes_table() || kind.lacks_loads() && !found.is_trusted()
 }

@@ -386,9 +386,9 @@ impl WarningKind {
         )
     }
 
-    /// Returns true if the table lacks loads that the problem speaks of.
+    /// Returns true if the table has no column of payloads although the problem says where one hangs.
     #[doc(hidden)]
-    pub const fn says_that_loads_lack(&self) -> bool {
+    pub const fn lacks_loads(&self) -> bool {
         matches!(self, Self::NoPayloadColumn { .. })
     }
 
