@@ -3,12 +3,13 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use flexcal::fit::{FindingCode, Identification, Options, Placement, identify};
+use flexcal::fit::{FindingCode, Identification, Options, Placement, SavedEstimate, identify};
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::Problem;
 use flexcal::quantity::Unit;
+use flexcal::results::{Document as _, IdentificationResult};
 use nalgebra::{DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -467,6 +468,12 @@ fn poses_that_views_leave_open_are_refused_with_the_reason() {
     let model = model_of(&known, &rows);
     let rows = measured(&model, &rows, &DVector::zeros(model.parameters.len()), 0.0);
     assert!(rows.len() >= 16, "{}", rows.len());
+    // From a declared pose the fit begins, but the estimate says that it is open.
+    let found = identify(&known, &split(&known, rows.clone()), &Options::default()).unwrap();
+    let json = IdentificationResult::new(&known, &found).to_json();
+    let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
+    let names = ["x", "y", "z"].map(|axis| format!("camera[hand].{axis}"));
+    assert!(!saved.undetermined(&names).is_empty(), "{json}");
     let unknown = flat
         .replace("at_m = [0.03, -0.05, 0.04]\nrotation_deg = [2, -3, 40]\n", "")
         .replace("at_m = [0.25, 0, -0.2]\nrotation_deg = [3, 4, 5]\n", "");

@@ -74,6 +74,8 @@ fn a_board_that_was_put_down_again_is_named_and_leaves_the_arm() {
     let (problem, _, found) = &calibrated;
     let json = IdentificationResult::new(problem, found).to_json();
     let estimate = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
+    let pose = ["x", "y", "z"].map(|axis| format!("camera[hand].{axis}"));
+    assert_eq!(estimate.undetermined(&pose), Vec::<&str>::new());
     let source = PriorSource::Estimate(Box::new(estimate.clone()));
     for (seed, (shift, turn)) in (40..).zip([(1e-3, 0.005), (3e-3, 0.02), (20e-3, 0.3)]) {
         let moved = [("marker[board].x", shift), ("marker[board].rz", turn)];
