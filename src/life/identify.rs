@@ -329,18 +329,15 @@ fn contradicting_evidence(assessed: &Assessment) -> Option<f64> {
     (evidence > CONTRADICTION_RATIO.ln()).then_some(evidence.max(assessed.ln_sum))
 }
 
-/// Returns the assessment with pairs of causes if the rows contradict the earlier estimate and no
-/// single change of the arm is the most probable cause, and unchanged otherwise: a single change is
-/// fitted first, and the rows are tested again. `None` if a number is not finite.
+/// Returns the assessment with pairs of causes, as `watch` tries them, if the rows contradict the
+/// earlier estimate, and unchanged otherwise. `None` if a number is not finite.
 fn paired(
     assessed: Assessment,
     rows: &SensitiveRows,
     factor: &DMatrix<f64>,
     causes: &mut Vec<Cause>,
 ) -> Option<Assessment> {
-    let first = assessed.causes.first().map(|first| &causes[first.cause]);
-    let is_of_arm = first.is_some_and(|cause| !cause.columns.is_empty());
-    if is_of_arm || contradicting_evidence(&assessed).is_none() {
+    if contradicting_evidence(&assessed).is_none() {
         return Some(assessed);
     }
     with_pairs(assessed, rows, factor, causes)
