@@ -1,13 +1,14 @@
 //! Arguments and work of `flexcal init`.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::problem::Problem;
 use flexcal::report;
 use flexcal::results::{Document as _, InitResult};
-use flexcal::urdf::{Chain, Robot, complete, describe_measured};
+use flexcal::urdf::{Chain, Robot, complete, describe_measured, text_of_table};
 
 use super::diagnostic;
 use super::flags::Flags;
@@ -21,12 +22,13 @@ use super::outcome::Outcome;
   flexcal init panda.urdf --tip panda_link8 --out panda
   flexcal init panda.urdf --tip panda_link8 --out panda --board 9x6x25
   flexcal init humanoid.urdf --tip head_camera --tip right_hand --board 9x6x25
-  flexcal init sheet.toml --out my-arm
+  flexcal init sheet.csv --out my-arm
   flexcal identify panda --data measurements.csv"
 )]
 pub struct Arguments {
-    /// The URDF (expand a xacro first), or a table of joints typed from a data sheet, ARM.toml
-    #[arg(value_name = "ARM.urdf")]
+    /// The URDF (expand a xacro first), or the table of joints of a data sheet: CSV with units in the
+    /// header (theta_deg, d_mm, a_mm, alpha_deg), or TOML
+    #[arg(value_name = "ARM.urdf|ARM.csv|ARM.toml")]
     urdf: PathBuf,
     /// Link at the base of the arm [default: the root]
     #[arg(long, value_name = "LINK")]
@@ -65,13 +67,18 @@ fn parse_board(text: &str) -> Result<Board, String> {
     Ok(([count(columns)?, count(rows)?], distance))
 }
 
-/// Completes the problem of an arm that was typed from a data sheet.
+/// Completes the problem of an arm that was typed from a data sheet, as TOML or as a CSV table.
 fn complete_sheet(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let has_link = arguments.base.iter().chain(&arguments.tip).next().is_some();
     if has_link || arguments.board.is_some() {
         return Err("--base, --tip and --board belong to a URDF, not to a table of joints".into());
     }
-    let (problem, text) = Problem::read_with_text(&arguments.urdf)?;
+    let (problem, text) = if has_ending(&arguments.urdf, &["toml"]) {
+        Problem::read_with_text(&arguments.urdf)?
+    } else {
+        let text = text_of_table(&arguments.urdf)?;
+        (Problem::parse(&text, &arguments.urdf)?, text.into())
+    };
     let description = complete(&problem, &text)?;
     let flags = &arguments.flags;
     let results =
@@ -83,9 +90,15 @@ fn complete_sheet(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::Done)
 }
 
+/// Returns true if the name of a file has one of the endings.
+fn has_ending(file: &Path, endings: &[&str]) -> bool {
+    let is_one = |ending: &OsStr| endings.iter().any(|one| ending.eq_ignore_ascii_case(one));
+    file.extension().is_some_and(is_one)
+}
+
 /// Writes the chain of a URDF between two links as `problem.toml`, or completes a typed problem.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
-    if arguments.urdf.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
+    if has_ending(&arguments.urdf, &["toml", "csv", "tsv", "txt"]) {
         return complete_sheet(arguments);
     }
     if let Some((_, mm)) = arguments.board.filter(|board| !USUAL_SQUARES_MM.contains(&board.1)) {

@@ -68,7 +68,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Make a problem of the arm in a URDF.
+    /// Make a problem of the arm in a URDF or a data sheet.
     Init(init::Arguments),
     /// Fit the free parameters of a problem and report them with their errors.
     Identify(identify::Arguments),

@@ -487,8 +487,9 @@ impl InputErrorKind {
     pub(crate) fn expected_file(&self) -> &'static str {
         match self {
             Self::Urdf(_) => {
-                "a URDF; export the arm as a URDF, or write its problem.toml by hand, a data sheet \
-                 of Denavit-Hartenberg parameters row by row (docs/tutorial.md, \"The data sheet\")"
+                "a URDF; export the arm as a URDF, or give the table of a data sheet as CSV with \
+                 units in the header (theta_deg, d_mm, a_mm, alpha_deg) or as TOML \
+                 (docs/own_arm.md, \"From a data sheet\")"
             }
             Self::TruthMissing => "a TRUTH.toml",
             Self::Study(_) => "a STUDY.toml",

@@ -222,7 +222,7 @@ pub enum TableErrorKind {
     NoPositionSigma,
     #[error(
         "in \"{value}\" day and month may stand in either order; write the year first \
-         (2024-05-31 14:03:20), or the month first with AM or PM"
+         (2024-05-31 14:03:20), day first with dots (31.05.2024), or month first with AM or PM"
     )]
     AmbiguousDate { value: String },
     #[error(
@@ -387,4 +387,19 @@ pub enum TableErrorKind {
         if *is_session { "; to hold out a session write held_out = { session = \"…\" } with its name" } else { "" }
     )]
     UnknownSplit { word: String, meant: Option<&'static str>, is_session: bool },
+}
+
+impl TableErrorKind {
+    /// Returns the offset of the clocks with which the rows of two tables have partners, with the
+    /// assignment of a larger tolerance that it needs, if the error states one.
+    pub(crate) fn clock_offset(&self) -> Option<&[String; 2]> {
+        match self {
+            Self::NothingJoined { offset, .. } => offset.as_ref(),
+            Self::MostUnpaired { offset, .. } | Self::CommonPartner { offset, .. } => {
+                offset.as_deref()
+            }
+            Self::ClocksDiffer { offset, .. } => Some(offset),
+            _ => None,
+        }
+    }
 }

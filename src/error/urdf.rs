@@ -11,6 +11,15 @@ use super::phrases::and_more;
 pub enum UrdfErrorKind {
     #[error("no such file; give a URDF")]
     Missing,
+    #[error("the column has no unit; write {write} in the header")]
+    SheetUnit { write: String },
+    #[error("\"{cell}\" is not a number, nor a coordinate with its constant part such as q2 - 90")]
+    SheetCell { cell: String },
+    #[error(
+        "no table of Denavit-Hartenberg parameters: it has no columns such as theta_deg, d_mm, \
+         a_mm, alpha_deg"
+    )]
+    SheetWithoutParameters,
     #[error("not valid XML: {message}")]
     Syntax { message: String },
     #[error("<{element}> is not closed; write </{name}> before </{before}> on line {line}")]

@@ -129,9 +129,15 @@ pub enum WarningKind {
     )]
     NotADate { value: String, write: String },
     #[error(
-        "{value} is read month first, as {read}; if its day comes first, write dates as YYYY-MM-DD"
+        "{value} is read {}, as {read}; if that is wrong, write dates as YYYY-MM-DD",
+        if *is_day_first { "day first, because numbers have decimal commas" } else { "month first" }
     )]
-    MonthFirst { value: String, read: String },
+    DateOrderAssumed { value: String, read: String, is_day_first: bool },
+    #[error(
+        "its clock differs from that of the measurements: rows are paired with offset_s = \
+         {offset}{tolerance}; check that these are the rows of the same hour"
+    )]
+    ClockOffsetFound { offset: String, tolerance: String },
     #[error(
         "equal to {first} in all digits{}; measurements do not repeat so exactly, and a copied \
          row counts twice: leave the copies out",

@@ -86,8 +86,33 @@ impl Measurements {
         Self::read_column_table(table, problem, Use::Planned)
     }
 
-    /// Reads files for a purpose.
+    /// Reads files for a purpose. If the joint tables are given with them, a difference of the clocks
+    /// is their own: rows are then paired with the offset that is found, and a warning states it.
     fn read_table(
+        files: &[PathBuf],
+        problem: &Problem,
+        table_use: Use,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
+        let as_declared = Self::read_files(files, problem, table_use);
+        let mut moved = problem.clone();
+        let given = moved.data.joint_log.as_mut().filter(|log| log.is_given);
+        let found = as_declared.as_ref().err().and_then(|error| match &*error.kind {
+            InputErrorKind::Table(kind) => kind.clock_offset(),
+            _ => None,
+        });
+        let Some((log, found)) = given.zip(found) else { return as_declared };
+        let Some(by) = log.by.moved_to(found) else { return as_declared };
+        log.by = by;
+        let location = Location::file(log.files.first().map_or(Path::new(""), PathBuf::as_path));
+        let [offset, tolerance] = found.clone();
+        let kind = WarningKind::ClockOffsetFound { offset, tolerance };
+        let (rows, warnings) = Self::read_files(files, &moved, table_use)?;
+        let found = Warning { location, kind };
+        Ok((rows, std::iter::once(found).chain(warnings).collect()))
+    }
+
+    /// Reads files for a purpose, joined as the problem declares.
+    fn read_files(
         files: &[PathBuf],
         problem: &Problem,
         table_use: Use,

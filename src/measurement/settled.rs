@@ -4,7 +4,7 @@
 use super::columns::{Column, Columns};
 use super::role::Role;
 use super::table::{Table, shortened};
-use super::time::{assumed_month_first, is_ambiguous};
+use super::time::{assumed, is_ambiguous};
 use crate::error::{InputError, Location, TableErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
@@ -69,9 +69,9 @@ impl Columns {
         let times = self.read.iter().find(|column| column.role == Role::Time);
         if let Some(place) = times.map(|column| column.place)
             && let value = table.instant(place)?
-            && let Some(read) = assumed_month_first(&value, table.date_order(place))
+            && let Some((read, is_day_first)) = assumed(&value, table.date_order(place))
         {
-            let kind = WarningKind::MonthFirst { value: shortened(&value), read };
+            let kind = WarningKind::DateOrderAssumed { value: shortened(&value), read, is_day_first };
             warnings.push(Warning { location: table.column(table.name_of(place)), kind });
         }
         let has_times =

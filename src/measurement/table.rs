@@ -94,7 +94,10 @@ impl Table {
             return Err(Location::file(file).error(other_format(found)));
         }
         let layout = Layout::detect(&beginning, dialect);
-        let date_order = DateOrder::of(&beginning);
+        let date_order = match DateOrder::of(&beginning) {
+            DateOrder::Unknown if dialect.decimal_comma => DateOrder::LikelyDayFirst,
+            order => order,
+        };
         let start: Arc<[u8]> = beginning.into();
         let text = Cursor::new(Arc::clone(&start)).chain(input);
         let lines = Lines::new(BufReader::with_capacity(1 << 16, text));

@@ -6,6 +6,8 @@ pub(super) enum DateOrder {
     /// No number above 12 shows the order, or dates contradict each other.
     #[default]
     Unknown,
+    /// The same in a table with decimal commas: where these are written, the day stands first.
+    LikelyDayFirst,
     DayFirst,
     MonthFirst,
 }
@@ -62,13 +64,15 @@ pub(super) fn is_ambiguous(text: &str, order: DateOrder) -> bool {
         .is_some_and(|(date, basis)| basis == Basis::Guess && iso_8601(&date).is_some())
 }
 
-/// Returns the date, such as `2026-11-05`, of a time that is read month first only because it has
-/// AM or PM, although the day may be first; `None` for other times.
-pub(super) fn assumed_month_first(text: &str, order: DateOrder) -> Option<String> {
+/// Returns the date, such as `2026-11-05`, of a time whose order of day and month is assumed: the
+/// month is first because of AM or PM, or the day because of decimal commas (true). `None` for
+/// other times.
+pub(super) fn assumed(text: &str, order: DateOrder) -> Option<(String, bool)> {
     let (date, basis) = iso_from_year_last(text.trim(), order)?;
     let differs = date.get(5..7)? != date.get(8..10)?;
-    let is_assumed = basis == Basis::HalfOfDay && differs && iso_8601(&date).is_some();
-    is_assumed.then(|| date.get(..10).map(str::to_owned))?
+    let is_assumed = matches!(basis, Basis::HalfOfDay | Basis::DecimalComma);
+    (is_assumed && differs && iso_8601(&date).is_some())
+        .then(|| Some((date.get(..10)?.to_owned(), basis == Basis::DecimalComma)))?
 }
 
 /// Reason for the order in which day and month of a date were read.
@@ -78,6 +82,8 @@ enum Basis {
     Numbers,
     /// AM or PM, which are usual with dates that have the month first.
     HalfOfDay,
+    /// Decimal commas, which are usual with dates that have the day first.
+    DecimalComma,
     /// No reason: the month is assumed to be first.
     Guess,
 }
@@ -102,9 +108,12 @@ fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
     let (order, basis) = match (order, DateOrder::of_date(numbers)) {
         // Other dates of the table were read month first because of AM or PM.
         (DateOrder::Unknown, Some(DateOrder::DayFirst)) if is_halved => return None,
+        (DateOrder::LikelyDayFirst, None) => (DateOrder::DayFirst, Basis::DecimalComma),
         (DateOrder::Unknown, None) if is_halved => (DateOrder::MonthFirst, Basis::HalfOfDay),
         (DateOrder::Unknown, None) => (DateOrder::MonthFirst, Basis::Guess),
-        (DateOrder::Unknown, Some(order)) | (order, _) => (order, Basis::Numbers),
+        (DateOrder::Unknown | DateOrder::LikelyDayFirst, Some(order)) | (order, _) => {
+            (order, Basis::Numbers)
+        }
     };
     let (month, day) = if order == DateOrder::DayFirst { (second, first) } else { (first, second) };
     Some((format!("{year}-{month:02}-{day:02} {hour:02}:{rest}"), basis))
@@ -307,8 +316,13 @@ mod tests {
         }
         let is_ambiguous = |text| is_ambiguous(text, DateOrder::Unknown);
         assert!(is_ambiguous("05/06/2024 14:03") && !is_ambiguous("05/31/2024 14:03"));
-        let assumed = |text: &str| assumed_month_first(text, DateOrder::Unknown);
-        assert_eq!(assumed("11/05/2026 09:00:12 AM").as_deref(), Some("2026-11-05"));
+        let month_first = assumed("11/05/2026 09:00:12 AM", DateOrder::Unknown);
+        assert_eq!(month_first, Some(("2026-11-05".to_owned(), false)));
+        let day_first = assumed("09/11/2026 15:41", DateOrder::LikelyDayFirst);
+        assert_eq!(day_first, Some(("2026-11-09".to_owned(), true)));
+        let with_commas = |text: &str| date_time(text, DateOrder::LikelyDayFirst);
+        assert_eq!(with_commas("09/11/2026 15:41"), iso_8601("2026-11-09T15:41"));
+        assert_eq!(with_commas("11/19/2026 15:41"), iso_8601("2026-11-19T15:41"));
         for clear in [
             "25/11/2026 09:00:12 AM",
             "11/25/2026 09:00:12 AM",
@@ -316,7 +330,7 @@ mod tests {
             "05/31/2024 14:03",
             "2.5",
         ] {
-            assert_eq!(assumed(clear), None, "{clear}");
+            assert_eq!(assumed(clear, DateOrder::Unknown), None, "{clear}");
         }
         let day_first = DateOrder::of(b"time,x\n05/06/2024 14:03,1\n13/06/2024 14:03,2/3\n");
         assert_eq!(day_first, DateOrder::DayFirst);

@@ -50,6 +50,16 @@ pub enum JoinRule {
     },
 }
 
+impl JoinRule {
+    /// Returns the rule with the offset of the clocks that an error states, and with its assignment of
+    /// a larger tolerance unless that is empty; `None` for rows that are not joined by time.
+    pub(crate) fn moved_to(self, [offset, tolerance]: &[String; 2]) -> Option<Self> {
+        let Self::Time { tolerance: declared, .. } = self else { return None };
+        let stated = tolerance.rsplit(' ').next().and_then(|number| number.parse().ok());
+        Some(Self::Time { offset: offset.parse().ok()?, tolerance: stated.unwrap_or(declared) })
+    }
+}
+
 /// Maximum time between paired rows if the file states none \[s\].
 const DEFAULT_TIME_TOLERANCE: f64 = 0.5;
 

@@ -36,7 +36,9 @@ const CONTINUOUS_RANGE: &str = "# A joint without limits: poses are planned with
 
 /// Section of the measured point, which the user fills in.
 pub(super) const TOOL: &str = "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured \
-                    point, in the frame of the tip\n";
+                    point, in the frame of the tip\n\
+                    # payload_kg = 10                              # if the hand carries a load\n\
+                    # payload_at_m = [0, 0, 0.1]                   # its centre of mass, same frame\n";
 
 /// Problem made from a chain of a URDF.
 #[derive(Debug, Clone)]

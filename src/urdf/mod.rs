@@ -22,6 +22,7 @@ mod patches;
 mod read;
 mod row;
 mod sheet;
+mod sheet_table;
 mod yaml;
 
 pub(crate) use branch::Steps;
@@ -33,6 +34,7 @@ pub use export::{Export, export};
 pub(crate) use patches::MovedOrigin;
 pub use read::Robot;
 pub(crate) use sheet::complete;
+pub(crate) use sheet_table::text_of_table;
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{

@@ -1,0 +1,191 @@
+//! Table of Denavit-Hartenberg parameters in CSV, with its units in the header, as a problem.
+
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+
+use crate::error::{InputError, Location, UrdfErrorKind};
+use crate::problem::item::Document;
+use crate::problem::quoted;
+
+/// Keys of a joint that a table may have, the angles among them first, and their other names.
+const KEYS: [(&str, &[&str]); 6] = [
+    ("theta", &["θ", "offset"]),
+    ("alpha", &["α", "twist"]),
+    ("min", &["lower"]),
+    ("max", &["upper"]),
+    ("d", &["s"]),
+    ("a", &["r"]),
+];
+/// Number of those of [`KEYS`] that are angles.
+const ANGLES: usize = 4;
+/// Index of `d` in [`KEYS`].
+const D: usize = 4;
+
+/// Column of a table that is read.
+struct Column {
+    place: usize,
+    /// Index in [`KEYS`].
+    key: usize,
+    unit: &'static str,
+}
+
+/// Returns the text of a problem with the joints of a table, whose rows are taken for standard
+/// Denavit-Hartenberg parameters. A cell such as `q2 - 90` or `θ2` states the constant part of the
+/// coordinate that the joint moves; if that is d, the joint is prismatic.
+///
+/// # Errors
+/// Returns an error if the file cannot be read, a column has no unit, or a cell is not a number.
+pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
+    let document = Document::read(file, UrdfErrorKind::Missing.into())?;
+    let text = document.text.trim_start_matches('\u{feff}');
+    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let delimiter =
+        [b';', b'\t', b','].into_iter().find(|&byte| first.as_bytes().contains(&byte));
+    let delimiter = delimiter.unwrap_or(b',');
+    let mut reader = ReaderBuilder::new()
+        .delimiter(delimiter)
+        .flexible(true)
+        .trim(Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(text.as_bytes());
+    let place = |line: usize, key: Option<&str>| {
+        let location = Location::file(file).at_line(line);
+        match key {
+            Some(key) => location.with_key(format!("column {key}")),
+            None => location,
+        }
+    };
+    let bad = |error: &csv::Error| {
+        let line = error.position().map_or(1, |position| position.line() as usize);
+        place(line, None).error(UrdfErrorKind::SheetCell { cell: error.to_string() })
+    };
+    let header = reader.headers().map_err(|error| bad(&error))?.clone();
+    let columns = columns(&header, |column| place(1, Some(column)))?;
+    let name = file.file_stem().map_or("arm".into(), |stem| stem.to_string_lossy());
+    let mut out = format!(
+        "name = {}\ndh = \"standard\"          # Rz(θ+q) Tz(d) Tx(a) Rx(α); without the line: Rx(α) \
+         Tx(a) Rz(θ+q) Tz(d)\njoint = [\n",
+        quoted(&name)
+    );
+    for record in reader.records() {
+        let record = record.map_err(|error| bad(&error))?;
+        let line = record.position().map_or(1, |position| position.line() as usize);
+        if record.iter().all(str::is_empty) {
+            continue;
+        }
+        let mut entries = Vec::new();
+        for column in &columns {
+            let cell = record.get(column.place).unwrap_or_default();
+            let unreadable = || {
+                let key = header.get(column.place);
+                place(line, key).error(UrdfErrorKind::SheetCell { cell: cell.to_owned() })
+            };
+            let comma = if delimiter == b',' { ',' } else { '.' };
+            let cell = cell.replace(',', &comma.to_string());
+            let (value, is_variable) = number(&cell, column.unit).ok_or_else(unreadable)?;
+            if is_variable && column.key == D {
+                entries.push("kind = \"prismatic\"".to_owned());
+            }
+            if !cell.is_empty() && (value != 0.0 || KEYS[column.key].0.starts_with('m')) {
+                entries.push(format!("{}_{} = {value}", KEYS[column.key].0, column.unit));
+            }
+        }
+        let _ = writeln!(out, "  {{ {} }},", entries.join(", "));
+    }
+    Ok(out + "]\n")
+}
+
+/// Returns the columns that hold parameters of joints. `at` is the place of a column in messages.
+fn columns(
+    header: &StringRecord,
+    at: impl Fn(&str) -> Location,
+) -> Result<Vec<Column>, InputError> {
+    let mut columns: Vec<Column> = Vec::new();
+    for (place, name) in header.iter().enumerate() {
+        let lower = name.to_lowercase();
+        let end = lower.find(|c: char| !c.is_alphabetic()).unwrap_or(lower.len());
+        let (word, rest) = lower.split_at(end);
+        let is_meant = |(key, others): &(&str, &[&str])| *key == word || others.contains(&word);
+        let Some(key) = KEYS.iter().position(is_meant) else { continue };
+        let unit = match rest.trim_matches(|c: char| !c.is_alphanumeric() && c != '°') {
+            "deg" | "degree" | "degrees" | "°" => Some("deg"),
+            "rad" => Some("rad"),
+            "mm" => Some("mm"),
+            "m" => Some("m"),
+            _ => None,
+        };
+        let units = if key < ANGLES { ["deg", "rad"] } else { ["mm", "m"] };
+        let is_limit = KEYS[key].0.starts_with('m');
+        let unit = unit.filter(|unit| is_limit || units.contains(unit)).ok_or_else(|| {
+            let write = units.map(|unit| format!("{}_{unit}", KEYS[key].0)).join(" or ");
+            at(name).error(UrdfErrorKind::SheetUnit { write })
+        })?;
+        columns.push(Column { place, key, unit });
+    }
+    let has = |key: &str| columns.iter().any(|column| KEYS[column.key].0 == key);
+    if !(has("alpha") && (has("a") || has("d"))) {
+        return Err(at("alpha").error(UrdfErrorKind::SheetWithoutParameters));
+    }
+    columns.sort_by_key(|column| column.key);
+    Ok(columns)
+}
+
+/// Parses a cell such as `-90`, `90°`, `π/2`, `q2 - 90` or empty for 0, in the unit of its column,
+/// and tells whether it names the coordinate of the joint; `None` for other texts.
+fn number(cell: &str, unit: &str) -> Option<(f64, bool)> {
+    let text: String = cell.replace('−', "-").replace("pi", "π").to_lowercase();
+    let text: String = text.chars().filter(|c| !" °*".contains(*c)).collect();
+    let is_name = |c: char| c.is_alphabetic() && c != 'π';
+    let Some(start) = text.find(is_name) else { return Some((constant(&text, unit)?, false)) };
+    if text.parse::<f64>().is_ok() {
+        return Some((text.parse().ok()?, false));
+    }
+    let (before, name) = text.split_at(start);
+    let end = name.find(['+', '-']).unwrap_or(name.len());
+    let before = before.strip_suffix('+').unwrap_or(before);
+    Some((constant(before, unit)? + constant(name.get(end..)?, unit)?, true))
+}
+
+/// Parses a number or a multiple of π \[rad\] in the `unit` of a column; 0 for an empty text.
+fn constant(text: &str, unit: &str) -> Option<f64> {
+    let Some((factor, divisor)) = text.split_once('π') else {
+        return if text.is_empty() { Some(0.0) } else { text.parse().ok() };
+    };
+    let factor = match factor {
+        "" | "+" => 1.0,
+        "-" => -1.0,
+        factor => factor.parse().ok()?,
+    };
+    let divisor = divisor.strip_prefix('/').map_or(Some(1.0), |divisor| divisor.parse().ok());
+    let radians: f64 = factor * PI / divisor.filter(|_| text.ends_with(['π']) || text.contains('/'))?;
+    Some(if unit == "deg" { radians.to_degrees() } else { radians })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_of_data_sheets_are_read() {
+        for (cell, value) in [
+            ("-90", (-90.0, false)),
+            ("90°", (90.0, false)),
+            ("−π/2", (-90.0, false)),
+            ("2pi/3", (120.0, false)),
+            ("", (0.0, false)),
+            ("q2", (0.0, true)),
+            ("θ2 - 90", (-90.0, true)),
+            ("90 + q_2", (90.0, true)),
+            ("1e2", (100.0, false)),
+        ] {
+            let (read, is_variable) = number(cell, "deg").unwrap();
+            assert!((read - value.0).abs() < 1e-12 && is_variable == value.1, "{cell}: {read}");
+        }
+        for cell in ["1.2.3", "--3", "π2", "q2*3 + x"] {
+            assert_eq!(number(cell, "deg"), None, "{cell}");
+        }
+    }
+}
