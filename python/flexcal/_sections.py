@@ -37,7 +37,9 @@ def toml_held_out(held_out: HeldOut) -> str:
 def with_data(text: str, values: dict[str, str]) -> str:
     """The text of a problem with other values of keys of ``[data]``, each of which stands on a line of its own or is added."""
     for key, value in values.items():
-        head = re.search(r"^[ \t]*\[data\][ \t]*(#.*)?$", text, re.MULTILINE)
+        head = re.search(r"^[ \t]*\[[ \t]*data[ \t]*\][ \t]*(#.*)?\r?$", text, re.MULTILINE)
+        if re.search(rf"^[ \t]*\[[ \t]*data[ \t]*\.[ \t]*\"?{key}\"?[ \t]*\]", text, re.MULTILINE):
+            raise InputError(f"{key}: the problem has a section [data.{key}]; change it there", key=key)
         dotted = re.search(rf"^[ \t]*data\.{key}[ \t]*=", text, re.MULTILINE)
         if dotted:
             start, end = dotted.start(), len(text)
@@ -47,7 +49,7 @@ def with_data(text: str, values: dict[str, str]) -> str:
         else:
             raise InputError(f"{key}: the problem has no section [data] in which it could be written", key=key)
         part = text[start:end]
-        line = rf"^([ \t]*(?:data\.)?{key}[ \t]*=[ \t]*)[^#\n]*?([ \t]*(?:#.*)?)$"
+        line = rf"^([ \t]*(?:data\.)?\"?{key}\"?[ \t]*=[ \t]*)[^#\n]*?([ \t]*(?:#.*)?\r?)$"
         part, count = re.subn(line, lambda found: found[1] + value + found[2], part, count=1, flags=re.MULTILINE)
         if count == 0:
             part = f"\n{key} = {value}{part}"

@@ -199,11 +199,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let sources = sources.as_ref().map(report::joint_sources_text);
     let outcome =
         diagnostic::report_fit_once(&identification, (common.quiet, common.prints_text()));
-    // Rules that free parameters are meant to: a later rule that holds all of them is a mistake.
     let is_any_freed = |rule: &ParameterRule| !matches!(rule.freedom, Freedom::Fixed);
-    let holds_all =
-        identification.unknowns.is_empty() && problem.parameters.iter().any(is_any_freed);
-    let outcome = if holds_all { Outcome::NotMet } else { outcome };
+    if identification.unknowns.is_empty() && problem.parameters.iter().any(is_any_freed) {
+        diagnostic::warn(
+            "no parameter is fitted, although [parameters] frees some: later lines hold all of them, \
+             or no parameter of this arm has such a name",
+        );
+    }
     common.print_result(&json, || {
         let accuracy = PredictionAccuracy::new(&identification, &shown);
         let told = if arguments.verbose {

@@ -8,7 +8,7 @@ use clap::Args;
 use flexcal::problem::Problem;
 use flexcal::report;
 use flexcal::results::{Document as _, InitResult};
-use flexcal::urdf::{Chain, Robot, complete, describe_measured, text_of_table};
+use flexcal::urdf::{Chain, Robot, complete, describe_measured, in_tree_order, text_of_table};
 
 use super::diagnostic;
 use super::flags::Flags;
@@ -111,7 +111,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut tips = arguments.tip.iter().map(|tip| Some(tip.as_str()));
     let to = |tip: Option<&str>| Chain::new(&robot, arguments.base.as_deref(), tip);
     let chain = to(tips.next().flatten())?;
-    let further = tips.map(to).collect::<Result<Vec<Chain>, _>>()?;
+    let further = in_tree_order(&chain, tips.map(to).collect::<Result<_, _>>()?)?;
+    if arguments.board.is_some() && further.len() > 1 {
+        return Err(
+            "--board takes one tip with the camera, and at most one that carries the board".into(),
+        );
+    }
     let description = describe_measured(&chain, &further, arguments.board)?;
     let flags = &arguments.flags;
     let results =

@@ -1,7 +1,7 @@
 //! Interrupts from the keyboard (SIGINT, Ctrl-C) and requests to end (SIGTERM).
 
 use std::process::exit;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Mutex, MutexGuard, Once, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -28,6 +28,14 @@ static WRITE_LOCK: Mutex<()> = Mutex::new(());
 static HEEDS_STOP_REQUEST: AtomicBool = AtomicBool::new(false);
 /// State of the running command.
 static STATE: Mutex<State> = Mutex::new(State::Running(None));
+
+/// Exit status after the signal that came first.
+static STATUS: AtomicU8 = AtomicU8::new(INTERRUPTED_STATUS);
+
+/// Returns the exit status of a command that an interrupt or a request to end has ended.
+pub fn status() -> u8 {
+    STATUS.load(Ordering::Relaxed)
+}
 
 /// State of the running command, which decides how an interrupt ends the process.
 enum State {
@@ -129,6 +137,9 @@ fn watch_termination() {
 /// final names.
 fn end_early(status: u8) {
     let is_repeated = stop_request().request();
+    if !is_repeated {
+        STATUS.store(status, Ordering::Relaxed);
+    }
     if is_repeated || !HEEDS_STOP_REQUEST.load(Ordering::Relaxed) {
         let _files = lock(&WRITE_LOCK);
         super::diagnostic::interrupted("interrupted before the end");
@@ -155,7 +166,7 @@ fn end_in_time() {
     let status = work.map_or_else(
         || {
             super::diagnostic::interrupted("interrupted before there was a result");
-            INTERRUPTED_STATUS
+            self::status()
         },
         |work| work(),
     );

@@ -104,7 +104,7 @@ impl LoopRecord {
             diagnostic::interrupted(
                 "interrupted before the first round was done: nothing is written",
             );
-            return interrupt::INTERRUPTED_STATUS;
+            return interrupt::status();
         }
         match self.write_closed_problem(&added) {
             Ok(file) => {
@@ -118,7 +118,7 @@ impl LoopRecord {
             }
             Err(error) => {
                 diagnostic::print(error.as_ref());
-                interrupt::INTERRUPTED_STATUS
+                interrupt::status()
             }
         }
     }

@@ -226,6 +226,10 @@ pub enum TableErrorKind {
     )]
     AmbiguousDate { value: String },
     #[error(
+        "the date of this time of day is empty in its column; write the date, or leave the row out"
+    )]
+    DateMissing,
+    #[error(
         "\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5{}",
         missing_date_hint(value)
     )]

@@ -63,6 +63,8 @@ pub enum UrdfErrorKind {
         listed(known)
     )]
     NoLink { name: String, known: Vec<String>, child: Option<String> },
+    #[error("--tip {name} is given twice; leave one of them out")]
+    RepeatedTip { name: String },
     #[error("no joint is called \"{name}\"{}", suggestion(name, known))]
     NoJoint { name: String, known: Vec<String> },
     #[error("the joints follow each other in a cycle of <mimic>")]

@@ -36,8 +36,11 @@ const MIN_RESTS: usize = 5;
 /// Smallest number of rows of a continuous log for each of its rests. A table with fewer has one row
 /// or some repeated ones for each pose.
 const MIN_ROWS_PER_REST: usize = 5;
-/// Largest difference of a number between two rows of a log in which the arm rests, in the unit of
-/// the table; readings of encoders scatter by less.
+/// Largest difference of a joint coordinate between two rows of a log in which the arm rests, by the
+/// unit at the end of its column's name; readings of encoders scatter by less.
+const MAX_RESTING_CHANGES: [(&str, f64); 4] =
+    [("_deg", 0.01), ("_rad", 2e-4), ("_mm", 0.05), ("_m", 5e-5)];
+/// The same for tables in which no name of a column ends with a unit.
 const MAX_RESTING_CHANGE: f64 = 0.01;
 /// Smallest fraction of the tested rows that a shift must pair with rests. Positions are measured
 /// while the arm rests.
@@ -60,19 +63,35 @@ impl Rest {
 
 /// Returns the rests of a joint table that logs all the time, also while the arm moves; empty for
 /// other tables. The rows are given in the order of their times \[s\], each with its cells; the
-/// column `key` holds the times.
+/// column `key` holds the times. Columns whose `names` end with a unit of joint coordinates decide,
+/// or all if there are none.
 pub(super) fn rests<'r>(
     rows: impl Iterator<Item = (f64, &'r ByteRecord)>,
+    names: &[String],
     key: Option<usize>,
 ) -> Vec<Rest> {
+    let limit = |name: &String| {
+        let of_unit = MAX_RESTING_CHANGES.iter().find(|(unit, _)| name.ends_with(unit));
+        of_unit.map(|(_, most)| *most)
+    };
+    let is_any_joint = names.iter().any(|name| limit(name).is_some());
+    // Largest change of each column that is compared.
+    let limits: Vec<Option<f64>> = names
+        .iter()
+        .enumerate()
+        .map(|(place, name)| {
+            let other = (!is_any_joint && Some(place) != key).then_some(MAX_RESTING_CHANGE);
+            limit(name).or(other)
+        })
+        .collect();
     let number = |cell: &[u8]| str::from_utf8(cell).ok()?.trim().parse::<f64>().ok();
-    let is_same = |one: &[u8], other: &[u8]| match (number(one), number(other)) {
-        (Some(one), Some(other)) => (one - other).abs() <= MAX_RESTING_CHANGE,
+    let is_same = |one: &[u8], other: &[u8], most: f64| match (number(one), number(other)) {
+        (Some(one), Some(other)) => (one - other).abs() <= most,
         _ => one == other,
     };
     let is_resting = |one: &ByteRecord, other: &ByteRecord| {
-        let mut pairs = one.iter().zip(other).enumerate();
-        pairs.all(|(place, (one, other))| Some(place) == key || is_same(one, other))
+        let mut pairs = one.iter().zip(other).zip(&limits);
+        pairs.all(|((one, other), most)| most.is_none_or(|most| is_same(one, other, most)))
     };
     let (mut rests, mut count): (Vec<Rest>, usize) = (Vec::new(), 0);
     let mut current: Option<(Rest, &ByteRecord)> = None;
@@ -262,6 +281,9 @@ pub(super) fn shifts_by_rows(times: &[f64], log: &[f64], tolerance: f64) -> Vec<
     let partner = |&time: &f64| nearest(log, time).filter(|(_, gap)| *gap <= tolerance);
     let pairs = times.iter().filter_map(|time| Some((*time, *log.get(partner(time)?.0)?)));
     let pairs: Vec<(f64, f64)> = pairs.collect();
+    if pairs.len() < MIN_WIDE_PAIRS {
+        return Vec::new();
+    }
     let shift = |by: i8| {
         let logged = |row: usize| pairs.get(row.checked_add_signed(-isize::from(by))?);
         let rows = pairs.iter().enumerate();
@@ -330,7 +352,8 @@ mod tests {
             }
             measured.push(time - f64::from(rest) / 4.0 + f64::from(pose % 5 - 2) + 3641.7);
         }
-        let rests = rests(rows.iter().map(|(time, cells)| (*time, cells)), Some(0));
+        let names = ["time", "q1"].map(str::to_owned);
+        let rests = rests(rows.iter().map(|(time, cells)| (*time, cells)), &names, Some(0));
         assert_eq!(rests.len(), 40);
         let log: Vec<f64> = rows.iter().map(|(time, _)| *time).collect();
         let shift = best_shift(&measured, (&log, &rests)).unwrap().seconds;
@@ -360,6 +383,12 @@ mod tests {
         assert_eq!(kind, Some(WarningKind::MovedAtTime { rows: 3, of: 40, offset: None }));
         // One row for each pose is no continuous log.
         let few = rows.iter().step_by(40).map(|(time, cells)| (*time, cells));
-        assert_eq!(super::rests(few, Some(0)), []);
+        assert_eq!(super::rests(few, &names, Some(0)), []);
+        // An arm that moves by 0.005 rad from row to row does not rest.
+        let radians = ["time", "q1_rad"].map(str::to_owned);
+        let cells = |k: i32| vec![k.to_string(), (0.005 * f64::from(k)).to_string()];
+        let slow: Vec<ByteRecord> = (0..200).map(|k| ByteRecord::from(cells(k))).collect();
+        let timed = slow.iter().enumerate().map(|(k, cells)| (k as f64, cells));
+        assert_eq!(super::rests(timed, &radians, Some(0)), []);
     }
 }

@@ -98,10 +98,12 @@ impl Table {
     /// another column.
     pub(super) fn instant(&self, place: usize) -> Result<Cow<'_, str>, InputError> {
         let word = self.text(place)?;
-        let date = self.date_of(place).filter(|_| !word.is_empty());
-        Ok(date.map_or(Cow::Borrowed(word), |date| {
-            Cow::Owned(joined(String::from_utf8_lossy(date).trim(), word))
-        }))
+        let date = self.date_of(place).filter(|_| !word.is_empty()).map(String::from_utf8_lossy);
+        match date.as_deref().map(str::trim) {
+            Some("") => Err(self.cell_error(place, TableErrorKind::DateMissing)),
+            Some(date) => Ok(Cow::Owned(joined(date, word))),
+            None => Ok(Cow::Borrowed(word)),
+        }
     }
 
     /// Returns a cell of the current row as a time \[s\]: a number, converted by `to_si`, or a date

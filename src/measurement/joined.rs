@@ -103,7 +103,7 @@ impl JoinedLog {
         joined.log_times = by_time.iter().map(time).collect();
         let key = time_key(&joined.names).map(|key| key.place);
         let timed = by_time.iter().filter_map(|&row| joined.rows.get(row));
-        joined.rests = rests(timed.map(|row| (row.time, &row.source.cells)), key);
+        joined.rests = rests(timed.map(|row| (row.time, &row.source.cells)), &joined.names, key);
         joined.by_time = by_time;
         if joined.rows.is_empty() {
             return Err(log.location.clone().error(TableErrorKind::NoDataFiles));
@@ -362,20 +362,23 @@ impl JoinedLog {
         let (left, rows, logged) = (self.unpaired.len(), self.requested, self.rows.len());
         let shift = self.shift();
         let offset = || shift.clone().map(|(_, offset)| offset);
-        if 2 * left > rows
+        let unused = self.rows.iter().filter(|row| row.uses == 0).count();
+        // An instrument that also measures between poses has many rows without a partner.
+        let are_most_left = 2 * left > rows && 2 * unused > logged;
+        if are_most_left
             && let Some((difference, pair)) =
                 usual_difference(&self.unpaired_names, self.unused_names())
         {
             let pair = quoted(pair);
             return error(TableErrorKind::NamesWrittenOtherwise { left, rows, difference, pair });
         }
-        if 2 * left > rows
+        if are_most_left
             && shift.as_ref().is_none_or(|(shift, _)| shift.gap > MAX_PLAUSIBLE_MEDIAN_GAP)
             && let Some(table) = self.table_without_seconds()
         {
             return error(TableErrorKind::SecondsLost { table });
         }
-        if let Some(error_kind) = self.small_tolerance().filter(|_| 2 * left > rows) {
+        if let Some(error_kind) = self.small_tolerance().filter(|_| are_most_left) {
             return error(error_kind);
         }
         if self.paired == 0 && self.requested > 0 {
@@ -394,7 +397,7 @@ impl JoinedLog {
         if !matches!(self.rule, JoinRule::Time { .. }) {
             return Ok(());
         }
-        if 2 * left > rows {
+        if are_most_left {
             let (keys, offset) = (self.keys().map(Box::new), offset().map(Box::new));
             let gap = self.gap();
             return error(TableErrorKind::MostUnpaired { left, rows, gap, keys, offset });

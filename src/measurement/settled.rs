@@ -71,7 +71,8 @@ impl Columns {
             && let value = table.instant(place)?
             && let Some((read, is_day_first)) = assumed(&value, table.date_order(place))
         {
-            let kind = WarningKind::DateOrderAssumed { value: shortened(&value), read, is_day_first };
+            let kind =
+                WarningKind::DateOrderAssumed { value: shortened(&value), read, is_day_first };
             warnings.push(Warning { location: table.column(table.name_of(place)), kind });
         }
         let has_times =

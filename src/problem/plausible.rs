@@ -115,8 +115,7 @@ const MAX_MASS_RATIO: f64 = 10.0;
 /// Largest plausible mass of one body of an arm \[kg\]. The heaviest industrial arms weigh some
 /// thousands of kilograms in all.
 const MAX_BODY_MASS: f64 = 1000.0;
-/// Largest mass of a part or payload, of an arm without an equilibrium, that is not taken for one in
-/// grams \[kg\]: 10 000 g are 10 kg.
+/// Largest mass of a part, of an arm without an equilibrium, that is not taken for one in grams \[kg\]: 10 000 g are 10 kg.
 const MAX_PLAUSIBLE_MASS: f64 = 1e4;
 /// Largest plausible size of gravity \[m/s²\]; that of Jupiter is 25.
 const MAX_GRAVITY: f64 = 30.0;
@@ -257,14 +256,14 @@ impl Problem {
         }
     }
 
-    /// Returns an error that names the first mass beyond [`MAX_PLAUSIBLE_MASS`], the payload of
-    /// `payload` kg among them, or a part of the arm that is more than [`MAX_MASS_RATIO`] times as
+    /// Returns an error that names the first part beyond [`MAX_PLAUSIBLE_MASS`] or the payload of
+    /// `payload` kg beyond [`MAX_BODY_MASS`], or a part of the arm that is more than [`MAX_MASS_RATIO`] times as
     /// heavy as all others together.
     fn heavy_mass_error(&self, payload: f64) -> Option<InputErrorKind> {
         let parts = || self.joints.iter().flat_map(Joint::named_masses);
-        let mut beyond = parts()
-            .chain([("the payload", payload)])
-            .filter(|(_, mass)| *mass > MAX_PLAUSIBLE_MASS);
+        let mut beyond = parts().filter(|(_, mass)| *mass > MAX_PLAUSIBLE_MASS).chain(
+            [("the payload", payload)].into_iter().filter(|(_, mass)| *mass > MAX_BODY_MASS),
+        );
         let found = |(name, mass): (&str, f64), how: String| InputErrorKind::HeavyMass {
             name: name.to_owned(),
             mass: two_digits(mass, 3),

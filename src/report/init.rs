@@ -73,15 +73,41 @@ pub fn sheet_text(problem: &Problem, description: &Description, folder: &Path) -
         let _ = writeln!(words, "  note: {note}");
     }
     let (written, word) = (folder.join("problem.toml").display().to_string(), shell_word(folder));
-    let _ = write!(
-        words,
-        "\nWritten to {written}, with the parameters held that positions cannot tell from others. \
-         Fill in there\n  \
-         target_m           where the measured point sits behind the last row, roughly\n  \
-         position_sigma_mm  1 σ of a coordinate that your instrument measures; now {SIGMA_MM}\n  \
-         sigma_deg, _mm     in [parameters]: how far off the sheet may be\n  \
-         files              your table or tables\n\
-         Next: flexcal check {word} --poses 40, then flexcal loop {word}\n"
-    );
+    let is_added = |section: &str| {
+        description.text.contains(section)
+            && !description.notes.iter().any(|note| note.contains(section))
+    };
+    let held = if is_added("[parameters]") {
+        ", with the parameters held that positions cannot tell from others"
+    } else {
+        ""
+    };
+    let _ = writeln!(words, "\nWritten to {written}{held}. Fill in there");
+    let lacks_range = |joint: &Joint| {
+        joint.takes_command() && !(joint.limits.0.is_finite() && joint.limits.1.is_finite())
+    };
+    let lines = [
+        (
+            problem.joints.iter().any(lacks_range),
+            "min_deg, max_deg    of each row: the range in which you measure (_mm where it slides)",
+        ),
+        (
+            is_added("[tool]"),
+            "target_m           where the measured point sits behind the last row, roughly",
+        ),
+        (
+            is_added("[data]"),
+            "position_sigma_mm  1 σ of a coordinate that your instrument measures",
+        ),
+        (
+            is_added("[parameters]"),
+            "sigma_deg, _mm     in [parameters]: how far off the sheet may be",
+        ),
+        (is_added("[data]"), "files              your table or tables"),
+    ];
+    for (_, line) in lines.into_iter().filter(|(is_needed, _)| *is_needed) {
+        let _ = writeln!(words, "  {line}");
+    }
+    let _ = writeln!(words, "Next: flexcal check {word} --poses 40, then flexcal loop {word}");
     words
 }

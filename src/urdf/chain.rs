@@ -31,6 +31,33 @@ pub struct Chain<'a> {
     pub(super) other_leaves: Vec<String>,
 }
 
+/// Orders chains to further tips so that each joint's branches follow it directly: after each chain
+/// comes the one that shares most joints with it.
+///
+/// # Errors
+/// Returns an error if two chains have the same tip.
+pub(crate) fn in_tree_order<'a>(
+    first: &Chain<'a>,
+    mut further: Vec<Chain<'a>>,
+) -> Result<Vec<Chain<'a>>, InputError> {
+    let mut ordered: Vec<Chain<'a>> = Vec::with_capacity(further.len());
+    while !further.is_empty() {
+        let last = ordered.last().unwrap_or(first);
+        let shared = |chain: &Chain| {
+            let pairs = chain.stages.iter().zip(&last.stages);
+            pairs.take_while(|(one, other)| one.joint == other.joint).count()
+        };
+        let nearest = (0..further.len()).rev().max_by_key(|&place| shared(&further[place]));
+        let next = further.remove(nearest.unwrap_or(0));
+        if std::iter::once(first).chain(&ordered).any(|other| other.tip == next.tip) {
+            let name = next.ends().1.to_owned();
+            return Err(first.robot.error(UrdfErrorKind::RepeatedTip { name }));
+        }
+        ordered.push(next);
+    }
+    Ok(ordered)
+}
+
 /// Moving joint of the chain. Its axis frame is the URDF's frame of the joint before motion,
 /// rotated so that z is the axis of the joint.
 pub(super) struct Stage {

@@ -99,6 +99,8 @@ pub fn describe_measured(
         }
     }
     notes.extend(notes::of_chain(chain, further));
+    let mut said = std::collections::HashSet::new();
+    notes.retain(|note| said.insert(note.clone()));
     let names: Vec<String> =
         ends.iter().filter_map(|end| Some(rows.get(end - 1)?.name.clone())).collect();
     let view = match board {

@@ -27,7 +27,7 @@ mod yaml;
 
 pub(crate) use branch::Steps;
 pub use chain::Chain;
-pub(crate) use chain::names_of_joints;
+pub(crate) use chain::{in_tree_order, names_of_joints};
 pub(crate) use describe::SIGMA_MM;
 pub use describe::{Description, describe};
 pub use export::{Export, export};

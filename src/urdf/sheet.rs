@@ -17,6 +17,12 @@ use crate::problem::{JointKind, Problem};
 pub(crate) fn complete(problem: &Problem, text: &str) -> Result<Description, InputError> {
     let document = text.parse::<DocumentMut>().ok();
     let has = |key: &str| document.as_ref().is_some_and(|document| document.contains_key(key));
+    if !problem.fixtures.is_empty() {
+        let note =
+            "cameras, planes and the like are declared, so what else is missing is left to write";
+        let (name, text) = (problem.name.clone(), text.to_owned());
+        return Ok(Description { name, text, notes: vec![note.to_owned()] });
+    }
     let mut notes = Vec::new();
     let mut text = format!("{}\n", text.trim_end());
     if !has("tool") && !has("target") {
@@ -37,7 +43,9 @@ pub(crate) fn complete(problem: &Problem, text: &str) -> Result<Description, Inp
         notes.push("the joints are a tree, so [parameters] is left to write".to_owned());
     }
     if has("data") {
-        notes.push("[data] is kept as it was".to_owned());
+        notes.push(
+            "[data] is kept as it was; its files are looked for beside problem.toml".to_owned(),
+        );
     } else {
         let _ = write!(text, "\n{}", data(problem));
     }

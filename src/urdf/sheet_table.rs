@@ -24,6 +24,9 @@ const ANGLES: usize = 4;
 /// Index of `d` in [`KEYS`].
 const D: usize = 4;
 
+/// Names of a joint coordinate in a cell, without its number.
+const COORDINATES: [&str; 6] = ["q", "θ", "theta", "t", "d", "s"];
+
 /// Column of a table that is read.
 struct Column {
     place: usize,
@@ -42,8 +45,7 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
     let document = Document::read(file, UrdfErrorKind::Missing.into())?;
     let text = document.text.trim_start_matches('\u{feff}');
     let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-    let delimiter =
-        [b';', b'\t', b','].into_iter().find(|&byte| first.as_bytes().contains(&byte));
+    let delimiter = [b';', b'\t', b','].into_iter().find(|&byte| first.as_bytes().contains(&byte));
     let delimiter = delimiter.unwrap_or(b',');
     let mut reader = ReaderBuilder::new()
         .delimiter(delimiter)
@@ -144,6 +146,10 @@ fn number(cell: &str, unit: &str) -> Option<(f64, bool)> {
         return Some((text.parse().ok()?, false));
     }
     let (before, name) = text.split_at(start);
+    let word: String = name.chars().take_while(|&c| is_name(c)).collect();
+    if !COORDINATES.contains(&&*word) {
+        return None;
+    }
     let end = name.find(['+', '-']).unwrap_or(name.len());
     let before = before.strip_suffix('+').unwrap_or(before);
     Some((constant(before, unit)? + constant(name.get(end..)?, unit)?, true))
@@ -160,7 +166,8 @@ fn constant(text: &str, unit: &str) -> Option<f64> {
         factor => factor.parse().ok()?,
     };
     let divisor = divisor.strip_prefix('/').map_or(Some(1.0), |divisor| divisor.parse().ok());
-    let radians: f64 = factor * PI / divisor.filter(|_| text.ends_with(['π']) || text.contains('/'))?;
+    let radians: f64 =
+        factor * PI / divisor.filter(|_| text.ends_with(['π']) || text.contains('/'))?;
     Some(if unit == "deg" { radians.to_degrees() } else { radians })
 }
 
@@ -184,7 +191,7 @@ mod tests {
             let (read, is_variable) = number(cell, "deg").unwrap();
             assert!((read - value.0).abs() < 1e-12 && is_variable == value.1, "{cell}: {read}");
         }
-        for cell in ["1.2.3", "--3", "π2", "q2*3 + x"] {
+        for cell in ["1.2.3", "--3", "π2", "q2*3 + x", "x2"] {
             assert_eq!(number(cell, "deg"), None, "{cell}");
         }
     }

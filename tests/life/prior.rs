@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::fit::{FindingCode, Identification, Options, SavedEstimate};
-use flexcal::life::{PriorError, PriorSource, update};
+use flexcal::life::{PriorError, PriorSource, update, watch};
 use flexcal::measurement::{Dataset, Split};
 use flexcal::report::estimate_text;
 use flexcal::results::{Document as _, IdentificationResult};
@@ -55,6 +55,27 @@ fn a_moved_zero_is_named_and_fitted() {
     assert_eq!(finding.word("cause"), Some("zero of joint 2"), "{finding}");
     println!("full {full:.2e}, prior {prior:.2e}");
     assert!(prior < 1.6 * full, "{full} {prior}");
+}
+
+#[test]
+fn two_moved_zeros_are_named_as_by_the_watch() {
+    let bench = Bench::new();
+    for (seed, zeros) in [(3, [2, 4]), (4, [2, 3]), (5, [3, 4])] {
+        let arm = bench.arm(seed);
+        let rows = bench.measure(&arm, FULL, 1000 + seed, 1.0);
+        let full = bench.saved(&bench.calibrate(&rows), &rows);
+        let changed = zeros.iter().fold(arm, |arm, &joint| with_zero(&arm, joint, 0.1));
+        let rows = bench.measure(&changed, 6, 7000 + seed, 1.0);
+        let watched = watch(&bench.problem, &full, &rows, (1.0, 0.01)).unwrap();
+        let prior = PriorSource::Estimate(Box::new(full));
+        let found =
+            update(&bench.problem, &whole(&rows), &Options::default(), &prior, 1.0).unwrap().found;
+        let finding = found.finding(FindingCode::EarlierEstimateContradicted).unwrap();
+        let named = zeros.map(|joint| format!("zero of joint {joint}"));
+        for cause in [finding.word("cause").unwrap(), &watched.causes[0].label] {
+            assert!(named.iter().all(|zero| cause.contains(zero.as_str())), "{zeros:?}: {cause}");
+        }
+    }
 }
 
 #[test]

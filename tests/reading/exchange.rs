@@ -78,6 +78,12 @@ fn dates_may_begin_with_the_day() {
         &["05/06/2024 02:03:20 PM is read month first, as 2024-05-06"],
     );
     assert_eq!(warnings("05/31/2024 02:03:20 PM"), "");
+    // Where decimals have commas, the day stands first.
+    let table = |date: &str| format!("A1;A2;X;Y;Z;temp;time\n1,5;2;3;4;5;20;{date} 14:03:20\n");
+    let (rows, warnings) = read(MAP, &table("09/11/2026")).unwrap();
+    let (same, _) = read(MAP, &table("2026-11-09")).unwrap();
+    assert_eq!(rows.time[0].to_bits(), same.time[0].to_bits());
+    assert_contains(&words(&warnings), &["read day first, because numbers have decimal commas"]);
 }
 
 #[test]

@@ -205,6 +205,17 @@ fn read_times(
     log: &[f64],
     measured: &[f64],
 ) -> Result<(Measurements, Vec<Warning>), InputError> {
+    read_given(more, log, measured, false)
+}
+
+/// Reads tables like [`read_times`]. If `is_given` is true, the joint table is given with the
+/// measurements, instead of one that the problem names.
+fn read_given(
+    more: &str,
+    log: &[f64],
+    measured: &[f64],
+    is_given: bool,
+) -> Result<(Measurements, Vec<Warning>), InputError> {
     let text = format!(
         "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['log.csv'], by = 'time'{more} }}\n"
     );
@@ -216,7 +227,8 @@ fn read_times(
     let log = format!("time_s,q1_deg,q2_deg\n{}", rows(log, ""));
     let folder =
         Folder::with([("problem.toml", &*text), ("tracker.csv", &tracker), ("log.csv", &log)]);
-    let problem = Problem::read(&folder.path("problem.toml"))?;
+    let mut problem = Problem::read(&folder.path("problem.toml"))?;
+    problem.data.joint_log.as_mut().unwrap().is_given = is_given;
     Measurements::read(&problem.data.files, &problem)
 }
 
@@ -240,6 +252,10 @@ fn the_offset_of_the_clocks_is_named_whatever_the_tolerance() {
         read_times(", offset_s = -124.8, tolerance_s = 0.6", &log, &measured).unwrap();
     assert!((30..40).contains(&rows.len()), "{}", rows.len());
     assert_contains(&words(&warnings), &["; tolerance_s = 0.", " would pair them too"]);
+    // A joint table that is given with new measurements has a clock of its own.
+    let (rows, warnings) = read_given(", offset_s = 3.5", &log, &measured, true).unwrap();
+    assert!(rows.len() >= 38, "{}", rows.len());
+    assert_contains(&words(&warnings), &["log.csv: its clock differs", "offset_s = -12"]);
     // Readings that follow their stops by seconds on one clock are paired rightly.
     let late: Vec<f64> = measured.iter().map(|time| time + 127.6).collect();
     assert_eq!(read_times(", tolerance_s = 4", &log, &late).unwrap().0.len(), 40);
@@ -255,6 +271,11 @@ fn a_join_that_loses_most_rows_is_refused_and_one_at_equal_steps_knows_its_shift
         &lost,
         &["40 of 50 measured rows have no partner", "typically 5.2 s away", "no other offset"],
     );
+    // An instrument that also measures between the poses of the joint table.
+    let often: Vec<f64> = (0..1500).map(|k| f64::from(k) + 0.2).collect();
+    let (rows, warnings) = read_times(", tolerance_s = 0.3", &every(0.0), &often).unwrap();
+    assert_eq!(rows.len(), 50);
+    assert_contains(&words(&warnings), &["1450 "]);
     let rows = read_times(", tolerance_s = 40", &every(0.0), &every(35.2)).unwrap().0;
     let before = rows.clock_offsets.iter().find(|(by, _)| *by == 1).unwrap().1;
     assert!((before - 35.2).abs() < 1e-6, "{before}");

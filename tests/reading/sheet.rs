@@ -30,3 +30,28 @@ fn a_data_sheet_becomes_a_problem_that_holds_what_positions_cannot_tell() {
     let wrong = folder.flexcal("init sheet.toml --tip flange --out arm").code(2);
     assert_contains(&wrong.stderr, &["--tip and --board belong to a URDF"]);
 }
+
+#[test]
+fn a_data_sheet_may_be_a_table_with_units_in_its_header() {
+    let table = "Joint;theta [deg];d (mm);a_mm;Alpha [°]\n1;q1;450;75;-90\n2;q2 - 90;0;640;0\n\
+                 3;θ3;;195;-90\n4;0;700,5;0;π/2\n5;q5;0;0;-90\n6;180;75;0;0\n";
+    let slide = "theta_deg,d_mm,alpha_deg\n0,q1,0\n";
+    let folder = Folder::with([("xr10.csv", table), ("slide.csv", slide)]);
+    let said = folder.flexcal("init xr10.csv --out arm").success().stdout;
+    assert_contains(&said, &["xr10: 6 moving joints", "min_deg, max_deg"]);
+    let rows = "{ alpha_deg = -90, d_mm = 450, a_mm = 75 },\n  { theta_deg = -90, a_mm = 640 },\n  \
+                { alpha_deg = -90, a_mm = 195 },\n  { alpha_deg = 90, d_mm = 700.5 },\n  \
+                { alpha_deg = -90 },\n  { theta_deg = 180, d_mm = 75 },\n]";
+    assert_contains(&folder.read("arm/problem.toml"), &["dh = \"standard\"", rows, "[data]"]);
+    folder.flexcal("init slide.csv --out slide").success();
+    assert_contains(&folder.read("slide/problem.toml"), &["kind = \"prismatic\"", "q1_mm"]);
+    for (header, why) in [
+        ("theta,d,a,alpha", "column theta: the column has no unit; write theta_deg or theta_rad"),
+        ("theta_deg,d_deg,alpha_deg", "column d_deg: the column has no unit; write d_mm or d_m"),
+        ("x_mm,y_mm,z_mm,q1_deg", "no table of Denavit-Hartenberg parameters"),
+        ("theta_deg,d_mm,a_mm,alpha_deg\n1,x*2,3,4", ":2: column d_mm: \"x*2\" is not a number"),
+    ] {
+        std::fs::write(folder.path("bad.csv"), format!("{header}\n0,0,0,0\n")).unwrap();
+        assert_contains(&folder.flexcal("init bad.csv --out bad").code(2).stderr, &[why]);
+    }
+}

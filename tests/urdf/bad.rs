@@ -41,7 +41,7 @@ fn mistakes_are_named_with_their_place() {
         ("other", "<sdf/>".to_owned(), ":1: not a URDF: its outermost element is <sdf>"),
         ("mjcf", "<mujoco/>".to_owned(), "mjcf-urdf-simple-converter"),
         ("sdf", "<sdf/>".to_owned(), "sdf2urdf"),
-        ("table", "joint,theta,d\n1,0,360\n".to_owned(), "row by row (docs/tutorial.md, \"The data sheet\")"),
+        ("table", "joint,theta,d\n1,0,360\n".to_owned(), "give the table of a data sheet as CSV"),
         ("page", "<!DOCTYPE html>\n<html>".to_owned(), ":1: an HTML page, not a URDF"),
         ("workbook", "PK\u{3}\u{4}".to_owned(), "a ZIP archive or a workbook (XLSX, ODS), not a URDF"),
         ("pdf", "%PDF-1.7".to_owned(), "a PDF document, not a URDF"),

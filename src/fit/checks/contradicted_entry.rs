@@ -76,7 +76,12 @@ pub(super) fn exchanged_targets<'a>(fit: &CheckedFit<'a>) -> Option<[&'a str; 2]
             let is_exchanged = one.joint == other.joint
                 && (place - other.at).norm() < limit
                 && (of_other - one.at).norm() < limit;
-            is_exchanged.then_some([one.name.as_str(), other.name.as_str()])
+            // A tool that is turned moves other targets of the joint, too.
+            let is_of_pair = |name: &str| name == one.name || name == other.name;
+            let others =
+                fitted.iter().filter(|(of, _)| of.joint == one.joint && !is_of_pair(&of.name));
+            let are_others_kept = others.clone().all(|(of, place)| (place - of.at).norm() < limit);
+            (is_exchanged && are_others_kept).then_some([one.name.as_str(), other.name.as_str()])
         },
     )
 }

@@ -291,9 +291,7 @@ impl Check for GivesWayToLoads {
             if !is_opposite || gravity.norm() == 0.0 {
                 return finding;
             }
-            // Adding 0 leaves no negative zero.
-            let axes: Vec<String> =
-                gravity.iter().map(|axis| (0.0 - axis + 0.0).to_string()).collect();
+            let axes: Vec<String> = gravity.iter().map(|axis| (0.0 - axis).to_string()).collect();
             let remedy = format!(
                 "if the arm hangs from a ceiling, or the sign of gravity is wrong, write \
                  gravity_m_s2 = [{}], with which it bends under its load; otherwise check the \

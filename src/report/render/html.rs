@@ -219,16 +219,34 @@ fn unbroken(code: &str) -> Markup {
     }
 }
 
-/// Returns a sentence in which negative numbers have a minus sign and stay beside the word before.
+/// Returns a sentence in which negative numbers have a minus sign and stay beside the word before,
+/// except in assignments such as `offset_s = -3.5`, which are copied.
 fn with_signs(sentence: &str) -> String {
     let mut signed = String::with_capacity(sentence.len());
+    let is_number = |rest: &&str| rest.starts_with(|letter: char| letter.is_ascii_digit());
+    // Number of open brackets of an assignment; `None` outside of one.
+    let mut assigned: Option<usize> = None;
     for (k, word) in sentence.split(' ').enumerate() {
-        let is_number = |rest: &&str| rest.starts_with(|letter: char| letter.is_ascii_digit());
-        match (k, word.strip_prefix('-').filter(is_number)) {
-            (0, Some(number)) if sentence.len() > word.len() => signed.extend(["−", number]),
+        let count = |brackets: [char; 2]| word.matches(brackets).count();
+        let is_value = assigned.is_some();
+        assigned = match assigned {
+            None => (word == "=").then_some(0),
+            Some(open) => Some((open + count(['[', '{'])).saturating_sub(count([']', '}'])))
+                .filter(|&open| open > 0),
+        };
+        let opening = word.find(|letter| letter != '(' && letter != '[').unwrap_or(0);
+        let (before, rest) = word.split_at(opening);
+        let number = rest.strip_prefix('-').filter(is_number).filter(|_| !is_value);
+        match (k, number) {
+            (0, Some(number)) if sentence.len() > word.len() => {
+                signed.extend([before, "−", number]);
+            }
             (0, _) => signed.push_str(word),
             (_, None) => signed.extend([" ", word]),
-            (_, Some(number)) => signed.extend(["\u{a0}−", number]),
+            (_, Some(number)) => {
+                let space = if before.is_empty() { "\u{a0}" } else { " " };
+                signed.extend([space, before, "−", number]);
+            }
         }
     }
     signed

@@ -104,8 +104,9 @@ impl Misreading {
         let Self::Shifted { by, from: 0 } = self else { return String::new() };
         let offset = table.clock_offsets.iter().find(|(rows, _)| *rows == by);
         offset.map_or_else(String::new, |(_, seconds)| {
+            let seconds = (seconds * 1e3).round() / 1e3;
             format!(
-                " (joined by time: the clocks may differ; with offset_s = {seconds:.1} in joints they \
+                " (joined by time: the clocks may differ; with offset_s = {seconds} in joints they \
                  belong to that of their own row)"
             )
         })
