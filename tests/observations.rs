@@ -21,6 +21,8 @@ mod derivatives;
 mod moved;
 #[path = "observations/named.rs"]
 mod named;
+#[path = "observations/open_poses.rs"]
+mod open_poses;
 #[path = "observations/overstated.rs"]
 mod overstated;
 #[path = "observations/recovery.rs"]

@@ -105,6 +105,9 @@ pub fn after_fit(
             "correct or free the intrinsics in {file} as the warning says, then flexcal identify \
              {named}"
         ),
+        None if found.has(FindingCode::ViewsUndecided) => format!(
+            "add views or declare a place as the warning says, then flexcal identify {named}"
+        ),
         None if holds_a_wrong_fixture(found) => {
             format!(
                 "correct or free in {file} what the warning names, then flexcal identify {named}"
@@ -400,8 +403,8 @@ fn open_camera(found: &Identification) -> Option<String> {
     };
     let name = &found.estimates.iter().find(is_open)?.name;
     Some(format!(
-        "hold {name} or declare the place of the camera or of the marker (at_m, rotation_deg), \
-         because these views do not determine it; or add views with the camera turned about two axes"
+        "hold {name} or what moves the same way, as the notes above say: export writes no pose that \
+         the rows leave open"
     ))
 }
 

@@ -12,7 +12,7 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::mechanics::Arm;
 use flexcal::model::Model;
 use flexcal::nalgebra::{DVector, Vector3};
-use flexcal::problem::Problem;
+use flexcal::problem::{Fixture, Problem};
 use flexcal::remainder;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, ExportResult, ExportedErrors};
@@ -152,9 +152,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     check_geometry(arguments, is_rigid)?;
     let problem = Problem::read(&arguments.problem)?;
     let estimates = arguments.trust.read(&arguments.estimate)?;
-    if camera.is_some_and(|(form, _)| form != code::CameraFormat::Ros) {
-        check_poses_of_cameras(&problem, &estimates, arguments.camera.as_deref())?;
-    }
+    check_poses(arguments, &problem, &estimates)?;
     if matches!(arguments.format, Some(Format::C)) {
         return write_c(arguments, &problem, &estimates);
     }
@@ -274,26 +272,32 @@ struct Rendered {
     elsewhere: Vec<String>,
 }
 
-/// Checks that the estimate determines the pose of the `chosen` camera, or of all if none is chosen.
+/// Checks that the estimate determines the poses that the file holds: those of cameras and markers
+/// on the arm in a URDF, and of cameras for OpenCV and Kalibr.
 ///
 /// # Errors
-/// Returns an error that names the first camera with a fitted coordinate without a standard error.
-fn check_poses_of_cameras(
+/// Returns an error that names the first camera or marker with an open coordinate.
+fn check_poses(
+    arguments: &Arguments,
     problem: &Problem,
     estimates: &SavedEstimate,
-    chosen: Option<&str>,
 ) -> Result<(), code::ExportError> {
-    for fixture in problem.fixtures.iter().filter(|fixture| fixture.kind.word() == "camera") {
-        let name = &fixture.name;
-        if chosen.is_some_and(|chosen| chosen != name) {
-            continue;
+    let is_written = |fixture: &Fixture| match arguments.format {
+        None => fixture.kind.has_pose() && fixture.carrier.is_some(),
+        Some(Format::Opencv | Format::Kalibr) => {
+            let is_chosen = arguments.camera.as_ref().is_none_or(|name| *name == fixture.name);
+            fixture.kind.word() == "camera" && is_chosen
         }
-        let names = ["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("camera[{name}].{axis}"));
+        Some(_) => false,
+    };
+    for fixture in problem.fixtures.iter().filter(|fixture| is_written(fixture)) {
+        let (kind, name) = (fixture.kind.word(), &fixture.name);
+        let names = ["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("{kind}[{name}].{axis}"));
         let open = estimates.undetermined(&names);
         if !open.is_empty() {
             let axes = open.iter().filter_map(|name| name.rsplit('.').next());
             return Err(code::ExportError::PoseOpen {
-                camera: name.clone(),
+                fixture: format!("{kind} \"{name}\""),
                 coordinates: axes.collect::<Vec<_>>().join(", "),
             });
         }

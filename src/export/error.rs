@@ -8,15 +8,15 @@ use crate::measurement::DatasetError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// The measurements do not determine the pose of a camera.
+    /// The measurements do not determine the pose of a camera or a marker.
     #[error(
-        "the measurements do not determine {coordinates} of camera \"{camera}\", so that its pose in \
+        "the measurements do not determine {coordinates} of {fixture}, so that its pose in \
          the file would be arbitrary; declare the place of the camera or of the marker (at_m, \
          rotation_deg), or add views with the camera turned about two axes"
     )]
     PoseOpen {
-        /// Name of the camera.
-        camera: String,
+        /// Kind and name of the camera or marker.
+        fixture: String,
         /// Names of the coordinates.
         coordinates: String,
     },

@@ -473,7 +473,10 @@ fn poses_that_views_leave_open_are_refused_with_the_reason() {
     let json = IdentificationResult::new(&known, &found).to_json();
     let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
     let names = ["x", "y", "z"].map(|axis| format!("camera[hand].{axis}"));
-    assert!(!saved.undetermined(&names).is_empty(), "{json}");
+    assert!(
+        !saved.undetermined(&names).is_empty() && found.has(FindingCode::ViewsUndecided),
+        "{json}"
+    );
     let unknown = flat
         .replace("at_m = [0.03, -0.05, 0.04]\nrotation_deg = [2, -3, 40]\n", "")
         .replace("at_m = [0.25, 0, -0.2]\nrotation_deg = [3, 4, 5]\n", "");

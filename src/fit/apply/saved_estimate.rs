@@ -14,6 +14,7 @@ use super::saved_estimate_error::{
 use super::saved_posterior::SavedPosterior;
 use crate::error::{binary_format, one_line};
 use crate::files::{Changes, changed_key, read_limited};
+use crate::fit::checks::open_views::MAX_POSE_ERROR;
 use crate::fit::checks::pose_sufficiency::label;
 use crate::fit::{Placement, Strategy};
 use crate::measurement::{Measurements, StartTimes};
@@ -118,14 +119,13 @@ struct RemainderEntry {
 }
 
 impl SavedEstimate {
-    /// Returns those of the parameters `names` that were fitted and have no standard error, because
-    /// the measurements do not determine them.
+    /// Returns those of the coordinates `names` of a pose that were fitted although the rows leave
+    /// them open.
     #[doc(hidden)]
     pub fn undetermined<'a>(&self, names: &'a [String]) -> Vec<&'a str> {
-        let is_open = |name: &&String| {
-            self.entry(name).is_some_and(|of| of.fitted == Some(true) && of.std_error.is_none())
-        };
-        names.iter().filter(is_open).map(String::as_str).collect()
+        let is_wide = |of: &Entry| of.std_error.is_none_or(|error| error > MAX_POSE_ERROR);
+        let is_open = |of: &Entry| of.fitted == Some(true) && is_wide(of);
+        names.iter().filter(|name| self.entry(name).is_some_and(is_open)).map(|x| &**x).collect()
     }
 
     /// Returns a copy of the estimate without the fitted parameters for whose name `is_left_out`

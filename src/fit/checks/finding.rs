@@ -105,6 +105,12 @@ finding_codes! {
     BaseNotDetermined: Error "base-not-determined" ["of", "poses"]
         "The measured points of a base leave its pose open, as points on a line do.",
         "measure more poses of this session, or give its base a prior";
+    ViewsUndecided: Error "views-undecided" ["kind", "parameters", "coordinates", "turn", "across"]
+        "The views of a camera leave its pose or that of the marker open, and no prior gives it: \
+         the camera does not turn about two axes, or sees a flat marker from the front only.",
+        "add views with the camera turned against the marker by 30° and more about two axes that \
+         are not parallel, or declare the place of the camera or of the marker (at_m, \
+         rotation_deg)";
     Misread: Error "misread" ["explanations", "before", "after"]
         "With another reading of the table or the problem, less than a fifth of the error \
          remains, or no more than noise.",

@@ -25,6 +25,7 @@ mod misread;
 pub(super) mod misreading;
 pub(super) mod nominal_error;
 pub(super) mod open_directions;
+pub(super) mod open_views;
 mod orientation;
 pub(super) mod outliers;
 pub(super) mod parameter_limits;

@@ -10,6 +10,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::open_views;
 use crate::fit::stages::parameter_size::plausible_size;
 use crate::least_squares::{UnidentifiableCombination, Weak};
 use crate::measurement::Measurements;
@@ -35,6 +36,8 @@ const MAX_NAMED: usize = 8;
 enum Open {
     /// No row depends on the unknown.
     Unseen,
+    /// Cameras and markers can move together, because the views do not decide their poses.
+    Views,
     /// All fixtures can move together.
     Together,
     /// The base and fixtures can move together in the measuring frame.
@@ -52,7 +55,7 @@ impl Open {
     const fn word(self) -> &'static str {
         match self {
             Self::Unseen => "unseen",
-            Self::Together => "together",
+            Self::Views | Self::Together => "together",
             Self::Place => "place",
             Self::Apart => "apart",
             Self::Focal => "focal-length",
@@ -66,6 +69,10 @@ impl Open {
             Self::Unseen => {
                 (format!("no row depends on {names}"), "hold them, or measure rows that do")
             }
+            Self::Views => (
+                format!("the views leave the poses of {names} open"),
+                FindingCode::ViewsUndecided.entry().remedy,
+            ),
             Self::Together => (
                 format!("{names} can move together: no row refers to a known place"),
                 "declare the place of one of them (at_m, rotation_deg)",
@@ -116,19 +123,26 @@ impl Check for NamedDirections {
             .map_or_else(|| DMatrix::zeros(0, sizes.len()), |weak| weak.rows);
         let scaled = DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, j| rows[(i, j)] * sizes[j]);
         let names: Vec<&str> = parameters.iter().map(|parameter| &*parameter.name).collect();
-        let finding = |(open, names): (Open, Vec<String>)| {
-            let [text, remedy] = open.words(&listed(&names));
-            let numbers = [json!(open.word()), json!(names)];
+        let finding = |OpenQuantity { kind, names: involved, unknowns }: OpenQuantity| {
+            let focal = kind == Open::Focal;
+            let poses = unknowns.into_iter().filter(|&k| is_fixture(names[k])).collect::<Vec<_>>();
+            if (focal || kind == Open::Views)
+                && let Some(finding) = open_views::undecided(fit, &poses, (&involved, focal))
+            {
+                return finding;
+            }
+            let [text, remedy] = kind.words(&listed(&involved));
+            let numbers = [json!(kind.word()), json!(involved)];
             Finding::new(FindingCode::NotToldApart, numbers, text).with_remedy(remedy)
         };
         let mut open = open_directions(&scaled, &names);
         if knows_a_length(fit.problem) {
-            for (kind, _) in open.iter_mut().filter(|(kind, _)| *kind == Open::Scale) {
-                *kind = Open::Apart;
+            for quantity in open.iter_mut().filter(|quantity| quantity.kind == Open::Scale) {
+                quantity.kind = Open::Apart;
             }
         }
         // The nominal arm misses contacts, so that another scale changes the data there.
-        if open.iter().all(|(open, _)| *open != Open::Scale) {
+        if open.iter().all(|quantity| quantity.kind != Open::Scale) {
             open.extend(scale(fit.problem, fit.fitting.measurements, &names));
         }
         open.into_iter().map(finding).collect()
@@ -148,8 +162,8 @@ pub(crate) fn open_scale(
     table: &Measurements,
     unknowns: &[&str],
 ) -> Option<String> {
-    let (open, names) = scale(problem, table, unknowns)?;
-    Some(open.words(&listed(&names)).join("; "))
+    let OpenQuantity { kind, names, .. } = scale(problem, table, unknowns)?;
+    Some(kind.words(&listed(&names)).join("; "))
 }
 
 /// Returns the scale with the lengths that change in proportion if no row measures a length:
@@ -159,34 +173,29 @@ pub(crate) fn open_scale(
 /// Lengths that other unknowns make up for may be held: those of the first joint, which move all
 /// points, and those from d of the last joint on, which move the target. Priors give the scale, but
 /// do not measure it. The commands of a sliding joint are known lengths.
-fn scale(
-    problem: &Problem,
-    table: &Measurements,
-    unknowns: &[&str],
-) -> Option<(Open, Vec<String>)> {
+fn scale(problem: &Problem, table: &Measurements, unknowns: &[&str]) -> Option<OpenQuantity> {
     let is_free = |name: &str| unknowns.contains(&name);
-    let has_axes =
-        |group: &str| ["x", "y", "z"].iter().all(|axis| is_free(&format!("{group}.{axis}")));
+    let has_axes = |group: &str| "xyz".chars().all(|axis| is_free(&format!("{group}.{axis}")));
     let is_unknown = |observation: &Observation| match *observation {
-        Observation::Point(point) => {
-            let fixture = problem.fixtures.get(point);
-            fixture.is_some_and(|point| has_axes(&format!("point[{}]", point.name)))
-        }
+        Observation::Point(point) => (problem.fixtures.get(point))
+            .is_some_and(|point| has_axes(&format!("point[{}]", point.name))),
         Observation::Tilt(_) => true,
         _ => false,
     };
     let rows: Vec<Observation> = (0..table.len()).map(|row| table.observation(row)).collect();
-    let touches = rows.iter().any(|row| row.is_point());
-    if !touches || !rows.iter().all(is_unknown) || !problem.distances.is_empty() {
+    if !rows.iter().any(|row| row.is_point())
+        || !rows.iter().all(is_unknown)
+        || !problem.distances.is_empty()
+    {
         return None;
     }
     let has_other_lengths =
-        problem.is_elastic() || problem.joints.iter().any(|joint| joint.beam.is_some());
-    let slides = |joint: &Joint| joint.command_kind() == JointKind::Prismatic;
-    if has_other_lengths || !problem.targets.is_empty() || !has_axes("tool") {
-        return None;
-    }
-    if problem.joints.iter().any(slides) {
+        |joint: &Joint| joint.beam.is_some() || joint.command_kind() == JointKind::Prismatic;
+    if problem.is_elastic()
+        || problem.joints.iter().any(has_other_lengths)
+        || !problem.targets.is_empty()
+        || !has_axes("tool")
+    {
         return None;
     }
     let moves = |joint: &Joint| joint.command_kind() != JointKind::Fixed;
@@ -202,7 +211,8 @@ fn scale(
         }
     }
     let are_free = lengths.iter().all(|name| is_free(name));
-    (are_free && !lengths.is_empty()).then_some((Open::Scale, lengths))
+    let found = OpenQuantity { kind: Open::Scale, names: lengths, unknowns: Vec::new() };
+    (are_free && !found.names.is_empty()).then_some(found)
 }
 
 /// Returns a sentence with a remedy for each kind of quantity that unidentifiable `combinations` of
@@ -221,7 +231,7 @@ pub(crate) fn open_quantities(
     if !names.iter().any(|name| is_fixture(name)) {
         return Vec::new();
     }
-    let sentence = |(open, names): (Open, Vec<String>)| open.words(&listed(&names)).join("; ");
+    let sentence = |open: OpenQuantity| open.kind.words(&listed(&open.names)).join("; ");
     open_directions(&rows, &names).into_iter().map(sentence).collect()
 }
 
@@ -268,26 +278,45 @@ fn is_length(name: &str) -> bool {
     fields.contains(&field(name)) || field(name) == "radius"
 }
 
+/// Quantity that the rows leave open.
+#[derive(Debug, PartialEq, Eq)]
+struct OpenQuantity {
+    kind: Open,
+    /// Names of the unknowns or groups involved.
+    names: Vec<String>,
+    /// Indices of the unknowns with a notable component; empty if they are not needed.
+    unknowns: Vec<usize>,
+}
+
 /// Returns the kinds of combinations in the null space that `rows` span, shape = (combinations,
 /// unknowns), each with the names of the unknowns or groups involved.
-fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String>)> {
+fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<OpenQuantity> {
     let Some(null) = orthonormal(rows) else { return Vec::new() };
     let mut found = Found { null, accounted: Vec::new() };
     let mut open = Vec::new();
-    let unseen: Vec<usize> =
-        (0..names.len()).filter(|&j| !found.within(|k| k == j).is_empty()).collect();
-    let unseen: Vec<String> = unseen.into_iter().map(|j| names[j].to_owned()).collect();
+    let unseen = (0..names.len()).filter(|&j| !found.within(|k| k == j).is_empty());
+    let unseen: Vec<String> = unseen.map(|j| names[j].to_owned()).collect();
     if !unseen.is_empty() {
-        open.push((Open::Unseen, unseen));
+        open.push(OpenQuantity { kind: Open::Unseen, names: unseen, unknowns: Vec::new() });
     }
     let named = |k: usize, is: &dyn Fn(&str) -> bool| is(names[k]);
     // Combinations of joint parameters alone are listed elsewhere.
     found.within(|k| named(k, &is_joint));
+    let is_focal = |name: &str| is_lens(name) && ["fx", "fy"].contains(&field(name));
     let mut add = |kind, directions: Vec<RowDVector<f64>>| {
         if !directions.is_empty() {
-            open.push((kind, involved(&directions, names)));
+            let mut unknowns = notable(&directions);
+            // Coefficients of the distortion follow the focal length.
+            if kind == Open::Focal {
+                unknowns.retain(|&k| !is_lens(names[k]) || is_focal(names[k]));
+            }
+            open.push(OpenQuantity { kind, names: involved(&unknowns, names), unknowns });
         }
     };
+    let is_marker = |name: &str| is_fixture(name) && name.starts_with("marker[");
+    let has_view = |name: &str| is_marker(name) || name.starts_with("camera[") && !is_lens(name);
+    add(Open::Together, found.within(|k| named(k, &is_marker)));
+    add(Open::Views, found.within(|k| named(k, &has_view)));
     add(Open::Together, found.within(|k| named(k, &is_fixture)));
     add(Open::Place, found.within(|k| named(k, &|name| is_base(name) || is_fixture(name))));
     let set_up = |name: &str| is_base(name) || is_tool(name) || is_fixture(name);
@@ -306,8 +335,9 @@ fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String
     lenses.dedup();
     for camera in lenses {
         let part = |name: &str| set_up(name) || is_lens(name) && group(name) == camera;
-        let is_focal = |name: &str| is_lens(name) && ["fx", "fy"].contains(&field(name));
-        add(Open::Apart, found.within(|k| named(k, &part) && !is_focal(names[k])));
+        // A combination is one of the focal length only if it has a notable part of it.
+        let without_focal = |k: usize| named(k, &part) && !is_focal(names[k]);
+        add(Open::Apart, found.within_up_to(MIN_NAMED_WEIGHT.powi(2), without_focal));
         add(Open::Focal, found.within(|k| named(k, &part)));
     }
     let scale = found.within(|k| named(k, &is_length));
@@ -333,16 +363,23 @@ impl Found {
     /// Returns the directions of the null space that lie in the unknowns for whose index
     /// `is_in_set` returns true, without those that earlier calls found. Adds them to `accounted`.
     fn within(&mut self, is_in_set: impl Fn(usize) -> bool) -> Vec<RowDVector<f64>> {
+        self.within_up_to(MAX_SQUARED_OUTSIDE, is_in_set)
+    }
+
+    /// Does the work of [`within`](Self::within) for directions whose squared part outside the set
+    /// is at most `max_outside`.
+    fn within_up_to(
+        &mut self,
+        max_outside: f64,
+        is_in_set: impl Fn(usize) -> bool,
+    ) -> Vec<RowDVector<f64>> {
         let unknowns = self.null.ncols();
         let outside: Vec<usize> = (0..unknowns).filter(|&k| !is_in_set(k)).collect();
-        if outside.len() == unknowns {
-            return Vec::new();
-        }
         let outside = self.null.select_columns(&outside);
         let eigen = (&outside * outside.transpose()).symmetric_eigen();
         let mut found = Vec::new();
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if *value > MAX_SQUARED_OUTSIDE {
+            if *value > max_outside {
                 continue;
             }
             let mut direction: RowDVector<f64> = vector.transpose() * &self.null;
@@ -374,15 +411,20 @@ fn orthonormal(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(unit.transpose().qr().q().transpose())
 }
 
-/// Returns the names of the unknowns with a notable component in some of the `directions`. For
-/// unknowns of bases, tools and fixtures it is the name of their group.
-fn involved(directions: &[RowDVector<f64>], names: &[&str]) -> Vec<String> {
+/// Returns the indices of the unknowns with a notable component in some of the `directions`.
+fn notable(directions: &[RowDVector<f64>]) -> Vec<usize> {
+    let is_part = |k: &usize| directions.iter().any(|of| of[*k].abs() > MIN_NAMED_WEIGHT);
+    (0..directions.first().map_or(0, RowDVector::len)).filter(is_part).collect()
+}
+
+/// Returns the names of `unknowns`. For those of bases, tools and fixtures it is the name of their
+/// group.
+fn involved(unknowns: &[usize], names: &[&str]) -> Vec<String> {
     let mut involved: Vec<String> = Vec::new();
-    for (k, name) in names.iter().enumerate() {
-        let is_part = directions.iter().any(|direction| direction[k].abs() > MIN_NAMED_WEIGHT);
+    for name in unknowns.iter().map(|&k| names[k]) {
         let is_single = is_joint(name) || is_lens(name);
-        let word = if is_single { (*name).to_owned() } else { group(name).to_owned() };
-        if is_part && !involved.contains(&word) {
+        let word = if is_single { name.to_owned() } else { group(name).to_owned() };
+        if !involved.contains(&word) {
             involved.push(word);
         }
     }
@@ -424,10 +466,7 @@ mod tests {
         };
         let open = |rows: &[RowDVector<f64>]| {
             let found = open_directions(&DMatrix::from_rows(rows), &names);
-            found
-                .into_iter()
-                .map(|(open, names)| (open.word(), names.join(" ")))
-                .collect::<Vec<_>>()
+            found.into_iter().map(|of| (of.kind.word(), of.names.join(" "))).collect::<Vec<_>>()
         };
         let unseen = row(&[(4, 1.0)]);
         let place = row(&[(3, 1.0), (7, -1.0)]);
