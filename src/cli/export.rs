@@ -199,7 +199,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         remarks.found = report::set_up_at(&model, x.as_slice());
     }
     let Rendered { text, moved, name: default, elsewhere } =
-        render(arguments, &problem, (&model, &x), (arm, &mut remarks))?;
+        render(arguments, &problem, geometry.rigid().unwrap_or((&model, &x)), (arm, &mut remarks))?;
     let path = flags.out.clone().unwrap_or_else(|| flags.folder(&problem.name).join(default));
     let folder = path
         .parent()

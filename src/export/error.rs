@@ -20,6 +20,13 @@ pub enum ExportError {
         /// Names of the coordinates.
         coordinates: String,
     },
+    /// Cameras or markers are mounted on a tree, of which only the frame of the target would be
+    /// approximated.
+    #[error(
+        "--best-rigid approximates the target alone, and this problem has cameras or markers on \
+         several branches; export without it"
+    )]
+    MountedOnTree,
     /// A law depends on earlier poses.
     #[error(
         "{formula} depends on earlier poses, which the generated code does not keep; identify \

@@ -9,7 +9,7 @@ use crate::fit::{self, ErrorSummary, Options, Placement, SavedEstimate, Strategy
 use crate::measurement::{Dataset, Split};
 use crate::mechanics::Arm;
 use crate::model::Model;
-use crate::problem::{Constraint, Joint, ParameterRule, Problem};
+use crate::problem::{Constraint, Fixture, Joint, ParameterRule, Problem};
 use crate::remainder::Correction;
 
 /// Choice of the rigid geometry to export.
@@ -32,6 +32,8 @@ pub struct Geometry {
     pub best_rigid: Option<RigidFit>,
     /// Fit of the rigid model with its bases and tools, if that was chosen; else `None`.
     pub fitted_alone: Option<fit::Identification>,
+    /// Rigid model of `fitted_alone`, which has its cameras and markers too.
+    pub(crate) rigid_model: Option<Model>,
     /// True if the exported file can hold a transform after the last moving joint.
     has_room: bool,
 }
@@ -69,13 +71,15 @@ impl Geometry {
     ) -> Result<Self, ExportError> {
         let arm = |model: &Model, x: &DVector<f64>| model.arm(|k| x.get(k).copied().unwrap_or(0.0));
         match choice {
-            GeometryChoice::Identified => {
-                Ok(Self { arm: arm(model, x), best_rigid: None, fitted_alone: None, has_room })
-            }
+            GeometryChoice::Identified => Ok(Self::of_arm(arm(model, x), has_room)),
             GeometryChoice::BestRigid(workspace) => {
+                let is_mounted = |fixture: &Fixture| fixture.carrier.is_some();
+                if !problem.is_chain() && problem.fixtures.iter().any(is_mounted) {
+                    return Err(ExportError::MountedOnTree);
+                }
                 let best = best_rigid(problem, estimate, correction, (workspace, has_room))?;
-                let arm = best.arm.clone();
-                Ok(Self { arm, best_rigid: Some(best), fitted_alone: None, has_room })
+                let whole = Self::of_arm(best.arm.clone(), has_room);
+                Ok(Self { best_rigid: Some(best), ..whole })
             }
             GeometryChoice::FittedAlone => {
                 let data = data.ok_or(ExportError::NeedsData)?;
@@ -83,10 +87,21 @@ impl Geometry {
                 let placement = Placement::of(&data.measurements);
                 let model = Model::new(&rigid, &placement.bases, &placement.targets)?;
                 let model = found.strategy.model(model);
-                let arm = arm(&model, &found.x);
-                Ok(Self { arm, best_rigid: None, fitted_alone: Some(found), has_room })
+                let alone = Self::of_arm(arm(&model, &found.x), has_room);
+                Ok(Self { fitted_alone: Some(found), rigid_model: Some(model), ..alone })
             }
         }
+    }
+
+    /// Returns the geometry of an arm, which neither approximates nor replaces the whole model.
+    const fn of_arm(arm: Arm<f64>, has_room: bool) -> Self {
+        Self { arm, best_rigid: None, fitted_alone: None, rigid_model: None, has_room }
+    }
+
+    /// Returns the rigid model with its full parameter vector, if it was fitted alone.
+    #[doc(hidden)]
+    pub fn rigid(&self) -> Option<(&Model, &DVector<f64>)> {
+        self.rigid_model.as_ref().zip(self.fitted_alone.as_ref().map(|found| &found.x))
     }
 
     /// Returns true if the rows of `data` that judge it show the errors of this geometry. Only

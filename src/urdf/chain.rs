@@ -29,6 +29,37 @@ pub struct Chain<'a> {
     /// Descriptions of the other leaves, with their numbers of moving joints, if the tip was chosen
     /// among several; otherwise empty.
     pub(super) other_leaves: Vec<String>,
+    /// Name of the camera whose link was given as the tip; `None` for other chains.
+    pub(super) camera: Option<String>,
+}
+
+impl Chain<'_> {
+    /// Returns the chain up to the link that carries the camera, if the tip is a link of a camera behind
+    /// fixed joints: its pose is to be found. The camera has the name of that link.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Chain::new`].
+    pub(crate) fn to_carrier_of_camera(self) -> Result<Self, InputError> {
+        let name = |link: usize| self.robot.link_name(link);
+        let is_camera = |link: usize| {
+            let lower = name(link).to_lowercase();
+            lower.contains("camera") || lower.contains("optical")
+        };
+        let mut carrier = self.tip;
+        for joint in self.joints.iter().rev().filter_map(|&joint| self.robot.joints.get(joint)) {
+            if joint.kind != Kind::Fixed || !is_camera(carrier) {
+                break;
+            }
+            carrier = joint.parent;
+        }
+        if carrier == self.tip {
+            return Ok(self);
+        }
+        let camera = name(self.tip);
+        let camera = camera.strip_suffix("_optical_frame").unwrap_or(&camera).to_owned();
+        let chain = Self::new(self.robot, Some(&name(self.base)), Some(&name(carrier)))?;
+        Ok(Self { camera: Some(camera), ..chain })
+    }
 }
 
 /// Orders chains to further tips so that each joint's branches follow it directly: after each chain
@@ -120,7 +151,7 @@ impl<'a> Chain<'a> {
             return Err(robot.error(UrdfErrorKind::TooManyJoints { found, most }));
         }
         let (stages, end) = (Vec::new(), Frame::identity());
-        let mut chain = Self { robot, base, tip, joints, stages, end, other_leaves };
+        let mut chain = Self { robot, base, tip, joints, stages, end, other_leaves, camera: None };
         chain.compute_stages()?;
         if chain.stages.is_empty() {
             let (base, tip) = (name(base), name(tip));

@@ -104,7 +104,7 @@ pub fn describe_measured(
     let names: Vec<String> =
         ends.iter().filter_map(|end| Some(rows.get(end - 1)?.name.clone())).collect();
     let view = match board {
-        Some((corners, distance)) => view(corners, distance, &names),
+        Some((corners, distance)) => view(corners, distance, &names, chain.camera.as_deref()),
         None if further.is_empty() => TOOL.to_owned(),
         None => targets(&tips),
     };
@@ -356,7 +356,7 @@ fn targets(tips: &[(&str, usize)]) -> String {
 
 /// Returns the sections of a camera on the tip and a board in the world, or on the second of several
 /// `tips`. The board has `columns` × `rows` corners at a `distance` \[mm\], in the order of OpenCV.
-fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String]) -> String {
+fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String], name: Option<&str>) -> String {
     let on = |tip: usize| tips.get(tip).filter(|_| tips.len() > 1).map(|name| quoted(name));
     let (camera, board) =
         (on(0).unwrap_or("\"tool\"".to_owned()), on(1).unwrap_or("\"world\"".to_owned()));
@@ -367,7 +367,7 @@ fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String]) -> String {
     };
     let corners: Vec<String> = (0..columns * rows).map(corner).collect();
     format!(
-        "\n[[camera]]\nname = \"camera\"\non = {camera}                                     # the frame that carries it; \"world\" if it stands apart\n\
+        "\n[[camera]]\nname = {}\non = {camera}                                     # the frame that carries it; \"world\" if it stands apart\n\
          focal_px = [900, 900]                            # fill in, roughly: it is fitted\n\
          centre_px = [640, 360]                           # fill in: half of the image\n\
          image_px = [1280, 720]                           # fill in: width and height\n\
@@ -375,6 +375,7 @@ fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String]) -> String {
          pixel_sigma = 0.3                                # fill in: 1 σ of u and v of a found corner\n\n\
          [[marker]]\nname = \"board\"\non = {board}                                     # or a frame of the arm, \"tool\" for one\n\
          points_mm = [{}]\n",
+        quoted(name.unwrap_or("camera")),
         corners.join(", ")
     )
 }

@@ -32,6 +32,10 @@ const MIN_GAIN_RATIO: f64 = 3.0;
 const REMAINING_SIGMAS: f64 = 2.0;
 /// Largest share of what exceeds the noise in χ² that another reading of the intrinsics leaves.
 const MAX_LEFT_BY_READING: f64 = 0.05;
+/// Smallest ratio by which free intrinsics decrease the reduced χ² where it is below 1 as declared, or
+/// that within views where the declared noise does not explain what they leave: a smaller decrease
+/// may come from the shape of the marker.
+const MIN_DECREASE: f64 = 1.1;
 /// Smallest number of degrees of freedom within views that determines the noise of pixels: its
 /// relative standard error is then √(2/200) = 10 %.
 const MIN_NOISE_FREEDOM: f64 = 200.0;
@@ -41,8 +45,8 @@ const MIN_NOISE_FREEDOM: f64 = 200.0;
 ///
 /// Within the views, no error of the arm acts: there, free intrinsics show their errors whatever else
 /// is wrong ([`is_shown_within_views`]). Otherwise this requires two conditions. By an F test, the
-/// decrease of χ² by the freed parameters is larger than noise explains. The decrease is also several times the misfit that remains beyond the noise
-/// of pixels. Otherwise the arm or a marker may be the cause, and free intrinsics only absorb a
+/// decrease of χ² by the freed parameters is larger than noise explains. The decrease is also several
+/// times the misfit that remains beyond the noise of pixels. Otherwise the arm or a marker may be the cause, and free intrinsics only absorb a
 /// part of their error. The noise of pixels is that within views ([`noise_within_views`]), or else
 /// the declared one.
 ///
@@ -82,15 +86,21 @@ pub(in crate::fit) fn lens_finding(
     let (noise, within) = of_views.unwrap_or((1.0, 0.0));
     let by_chance = REMAINING_SIGMAS * noise * (2.0 * (freedom - within).max(0.0)).sqrt();
     let remaining = (after - noise) * freedom - by_chance;
-    let explains = chance <= MAX_CHANCE_PROBABILITY && gain > MIN_GAIN_RATIO * remaining;
     let before_within = noise_within_views(problem, data, found).map(|(noise, _)| noise);
+    let is_bent = noise > 1.0 + REMAINING_SIGMAS * (2.0 / within.max(1.0)).sqrt()
+        && before_within.is_some_and(|before| before < MIN_DECREASE * noise);
+    let explains = chance <= MAX_CHANCE_PROBABILITY
+        && gain > MIN_GAIN_RATIO * remaining
+        && (before > 1.0 || before > MIN_DECREASE * after)
+        && !is_bent;
     let shown = before_within.zip(of_views).filter(|&(before, (after, freedom))| {
         is_shown_within_views((before, after), freedom, fixed.len() as f64)
+            && (before > 1.0 || before > MIN_DECREASE * after)
     });
     if !explains && shown.is_none() {
         return None;
     }
-    let off = deviating(&other, &fixed);
+    let off = deviating(&other, &fixed, after);
     let words = off.iter().map(|estimate| {
         let error = estimate.std_error.unwrap_or_default();
         format!("{} = {:.6} ± {error:.6}", estimate.name, estimate.estimate)
@@ -105,14 +115,15 @@ pub(in crate::fit) fn lens_finding(
     let text = match shown.filter(|_| !explains) {
         Some((before, (after, _))) => format!(
             "the intrinsics are not as declared: with {words} the reduced χ² within the views, \
-             where no error of the arm acts, falls from {before:.3} to {after:.3}; the arm errs as well"
+             where no error of the arm acts, falls from {before:.3} to {after:.3}; something beyond \
+             the views errs as well"
         ),
         None => format!(
             "the intrinsics are not as declared: with {words} the reduced χ² falls from {before:.3} to \
              {after:.3}, by chance with probability {chance}"
         ),
     };
-    if let Some((words, after)) = other_lens(problem, before, &fit) {
+    if let Some((words, after)) = other_lens(problem, (before, noise), &fit) {
         let text = format!(
             "the intrinsics are not as declared: with {words} the reduced χ² falls from \
              {before:.3} to {after:.3}"
@@ -121,17 +132,24 @@ pub(in crate::fit) fn lens_finding(
         let finding = Finding::new(FindingCode::LensContradicted, numbers, text);
         return Some(finding.with_remedy("correct the camera".to_owned()));
     }
+    if off.is_empty() {
+        return None;
+    }
     let numbers = [json!(names), json!(before), json!(after)];
     let remedy = format!("{}, or declare better ones", freeing(problem, &fixed));
     Some(Finding::new(FindingCode::LensContradicted, numbers, text).with_remedy(remedy))
 }
 
-/// Returns the freed parameters of each kind that deviates from the declared values beyond chance, or
-/// of the one kind that deviates most.
+/// Returns the freed parameters of each kind that deviates from the declared values beyond chance.
 ///
 /// Parameters of one kind are judged together, by the χ² of their deviations with their covariance:
-/// they make up for each other, so that each alone may have a large standard error.
-fn deviating<'a>(found: &'a Identification, freed: &[String]) -> Vec<&'a Estimate> {
+/// they make up for each other, so that each alone may have a large standard error. A
+/// `reduced_chi2` above 1, which errors of the arm cause, widens the covariance.
+fn deviating<'a>(
+    found: &'a Identification,
+    freed: &[String],
+    reduced_chi2: f64,
+) -> Vec<&'a Estimate> {
     let mut kinds: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for (place, &of) in found.covariance.parameters.iter().enumerate() {
         let name = &found.estimates[of].name;
@@ -148,6 +166,7 @@ fn deviating<'a>(found: &'a Identification, freed: &[String]) -> Vec<&'a Estimat
         let deviations = places.iter().map(|&place| of(place).estimate - of(place).nominal);
         let deviations = DVector::from_iterator(places.len(), deviations);
         let chi2 = deviations.dot(&covariance.cholesky()?.solve(&deviations));
+        let chi2 = chi2 / reduced_chi2.max(1.0);
         Some((ChiSquared::new(places.len() as f64).ok()?.sf(chi2), chi2))
     };
     let mut judged: Vec<(f64, f64, Vec<usize>)> = kinds
@@ -155,9 +174,8 @@ fn deviating<'a>(found: &'a Identification, freed: &[String]) -> Vec<&'a Estimat
         .filter_map(|places| chance(&places).map(|(chance, chi2)| (chance, chi2, places)))
         .collect();
     judged.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
-    let beyond = judged.iter().filter(|(chance, ..)| *chance <= MAX_NAMED_CHANCE).count();
-    let mut named: Vec<usize> =
-        judged.into_iter().take(beyond.max(1)).flat_map(|(.., places)| places).collect();
+    judged.retain(|(chance, ..)| *chance <= MAX_NAMED_CHANCE);
+    let mut named: Vec<usize> = judged.into_iter().flat_map(|(.., places)| places).collect();
     named.sort_unstable();
     named.into_iter().map(|place| &found.estimates[found.covariance.parameters[place]]).collect()
 }
@@ -187,11 +205,11 @@ fn freeing(problem: &Problem, names: &[String]) -> String {
 }
 
 /// Returns the words of the other reading of the intrinsics of a camera with which the images fit
-/// best, and the reduced χ² with it; `None` if none explains what exceeds the noise in `before`, the
+/// best, and the reduced χ² with it; `None` if none explains what exceeds `noise` in `before`, the
 /// reduced χ² as declared.
 fn other_lens(
     problem: &Problem,
-    before: f64,
+    (before, noise): (f64, f64),
     fit: impl Fn(&Problem) -> Result<Identification, IdentifyError>,
 ) -> Option<(String, f64)> {
     let cameras = problem.fixtures.iter().enumerate();
@@ -206,7 +224,9 @@ fn other_lens(
         Some((words, found.reduced_chi2?))
     });
     let (words, after) = explained.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (after - 1.0 < MAX_LEFT_BY_READING * (before - 1.0)).then_some((words, after))
+    let is_explained =
+        before > MIN_DECREASE * after && after - noise < MAX_LEFT_BY_READING * (before - noise);
+    is_explained.then_some((words, after))
 }
 
 /// Returns the other readings of the declared centre and distortion of a pinhole camera: their words
@@ -280,6 +300,7 @@ fn noise_within_views(
     let Dataset { measurements, split } = data;
     let placement = Placement::of(measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets).ok()?;
+    let model = found.strategy.model(model);
     let poses = placement.poses(measurements, &split.identification, found.sigma);
     let fixtures = model.fixtures(found.x.as_slice());
     let carriers = model.carrier_frames(&poses, found.x.as_slice());
