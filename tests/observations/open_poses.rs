@@ -143,6 +143,10 @@ fn a_hand_that_only_translates_or_turns_about_one_axis_leaves_poses_open() {
     let (kind, said) = named(&scara.fit(POSES)).unwrap();
     assert_eq!(kind, "one-axis");
     assert_contains(&said, &["about one axis only", "from the front only"]);
+    // Priors of tilts determine the height within decimetres and more.
+    let tilts = scara.fit(&format!("\"joint*.alpha\" = {{ sigma_deg = 0.2 }}\n{POSES}"));
+    let (_, said) = named(&tilts).unwrap();
+    assert_contains(&said, &["camera[eye] and marker[board] open", "from the front only"]);
     let found = scara.fit(&format!("{POSES}\"camera[eye].z\" = {{ fixed = true }}\n"));
     assert_eq!(named(&found), None);
     assert!(found.is_trusted(), "{:?}", found.findings);

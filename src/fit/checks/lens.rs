@@ -32,7 +32,10 @@ const MIN_GAIN_RATIO: f64 = 3.0;
 const REMAINING_SIGMAS: f64 = 2.0;
 /// Largest share of what exceeds the noise in χ² that another reading of the intrinsics leaves.
 const MAX_LEFT_BY_READING: f64 = 0.05;
-/// Smallest ratio by which free intrinsics decrease the reduced χ² where it is below 1 as declared, or
+/// Reduced χ² below which the residual is far below the declared noise: an error of the lens that
+/// hardly decreases it is small.
+const FAR_BELOW_DECLARED: f64 = 0.5;
+/// Smallest ratio by which free intrinsics decrease the reduced χ² below [`FAR_BELOW_DECLARED`], or
 /// that within views where the declared noise does not explain what they leave: a smaller decrease
 /// may come from the shape of the marker.
 const MIN_DECREASE: f64 = 1.1;
@@ -91,11 +94,11 @@ pub(in crate::fit) fn lens_finding(
         && before_within.is_some_and(|before| before < MIN_DECREASE * noise);
     let explains = chance <= MAX_CHANCE_PROBABILITY
         && gain > MIN_GAIN_RATIO * remaining
-        && (before > 1.0 || before > MIN_DECREASE * after)
+        && (before > FAR_BELOW_DECLARED || before > MIN_DECREASE * after)
         && !is_bent;
     let shown = before_within.zip(of_views).filter(|&(before, (after, freedom))| {
         is_shown_within_views((before, after), freedom, fixed.len() as f64)
-            && (before > 1.0 || before > MIN_DECREASE * after)
+            && (before > FAR_BELOW_DECLARED || before > MIN_DECREASE * after)
     });
     if !explains && shown.is_none() {
         return None;
@@ -132,15 +135,13 @@ pub(in crate::fit) fn lens_finding(
         let finding = Finding::new(FindingCode::LensContradicted, numbers, text);
         return Some(finding.with_remedy("correct the camera".to_owned()));
     }
-    if off.is_empty() {
-        return None;
-    }
     let numbers = [json!(names), json!(before), json!(after)];
     let remedy = format!("{}, or declare better ones", freeing(problem, &fixed));
     Some(Finding::new(FindingCode::LensContradicted, numbers, text).with_remedy(remedy))
 }
 
-/// Returns the freed parameters of each kind that deviates from the declared values beyond chance.
+/// Returns the freed parameters of each kind that deviates from the declared values beyond chance, or
+/// of the one kind that deviates most.
 ///
 /// Parameters of one kind are judged together, by the χ² of their deviations with their covariance:
 /// they make up for each other, so that each alone may have a large standard error. A
@@ -174,8 +175,9 @@ fn deviating<'a>(
         .filter_map(|places| chance(&places).map(|(chance, chi2)| (chance, chi2, places)))
         .collect();
     judged.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
-    judged.retain(|(chance, ..)| *chance <= MAX_NAMED_CHANCE);
-    let mut named: Vec<usize> = judged.into_iter().flat_map(|(.., places)| places).collect();
+    let beyond = judged.iter().filter(|(chance, ..)| *chance <= MAX_NAMED_CHANCE).count();
+    let mut named: Vec<usize> =
+        judged.into_iter().take(beyond.max(1)).flat_map(|(.., places)| places).collect();
     named.sort_unstable();
     named.into_iter().map(|place| &found.estimates[found.covariance.parameters[place]]).collect()
 }

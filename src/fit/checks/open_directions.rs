@@ -145,7 +145,19 @@ impl Check for NamedDirections {
         if open.iter().all(|quantity| quantity.kind != Open::Scale) {
             open.extend(scale(fit.problem, fit.fitting.measurements, &names));
         }
-        open.into_iter().map(finding).collect()
+        let mut findings: Vec<Finding> = open.into_iter().map(finding).collect();
+        // A pose that the rows determine only within decimetres is open, too.
+        let is_vague = |&k: &usize| {
+            is_fixture(names[k])
+                && fit.statistics.determined[k]
+                && fit.statistics.errors[k] > open_views::MAX_POSE_ERROR
+        };
+        let vague: Vec<usize> = (0..names.len()).filter(is_vague).collect();
+        if findings.iter().all(|finding| finding.code != FindingCode::ViewsUndecided) {
+            let involved: Vec<String> = vague.iter().map(|&k| names[k].to_owned()).collect();
+            findings.extend(open_views::undecided(fit, &vague, (&involved, false)));
+        }
+        findings
     }
 }
 
