@@ -29,6 +29,8 @@ mod overstated;
 mod recovery;
 #[path = "observations/results.rs"]
 mod results;
+#[path = "observations/shutter.rs"]
+mod shutter;
 #[path = "observations/view_readings.rs"]
 mod view_readings;
 #[path = "observations/views.rs"]

@@ -42,6 +42,8 @@ pub enum ArgumentKind {
     Beam,
     /// Name of a covariate of the problem.
     Covariate,
+    /// Name of a camera of the problem.
+    Camera,
     /// Integer orders of harmonics.
     Orders,
     /// Order of a wave \[cycles per revolution\].
@@ -81,7 +83,7 @@ pub enum Argument {
     Joint(usize),
     /// Orders of harmonics.
     Orders(Vec<u32>),
-    /// Name of a beam or of a covariate.
+    /// Name of a beam, a camera or a covariate.
     Name(String),
     /// Time \[s\], path \[rad\], or order of a wave.
     Number(f64),

@@ -106,6 +106,12 @@ const SETUP_SHIFT_SIGMA: f64 = 1e-2;
 const FLEXIBILITY_SIGMA: f64 = 1e-2;
 /// Prior σ of a displacement of the payload's centre of mass \[m\].
 const PAYLOAD_SHIFT_SIGMA: f64 = 0.1;
+/// Prior σ of the time between the reading of the joints and the exposure of an image's first row
+/// \[s\].
+const EXPOSURE_DELAY_SIGMA: f64 = 0.02;
+/// Prior σ of the time between the exposures of successive rows of an image \[s\]; sensors read a
+/// row in 5 to 60 µs.
+const ROW_TIME_SIGMA: f64 = 3e-5;
 /// Largest plausible rotation of a joint by the cubic term of its torsion, under the largest
 /// plausible moment \[rad\].
 const MAX_TURN: f64 = 0.1;
@@ -450,6 +456,18 @@ catalogue! {
         says: "the measuring station or the arm's base settles with a time constant of {time_constant_s} s",
         says_by_row: "the measuring station or the arm's base settles with a time constant of {time_constant_s} rows",
         search: Search::SettlingTimes,
+        ..Family::PLAIN
+    };
+    /// Exposure of an image while the arm moves: a pixel in row v shows the arm at the joint
+    /// coordinates q + q̇ (t₀ + v `t_row`), with the recorded velocities q̇. A rolling shutter exposes
+    /// one row after another, a global shutter has `t_row` = 0.
+    RollingShutter "rolling-shutter" { camera: String = Camera } => Family {
+        terms: &[
+            TermEntry::at(At::Exposure { by_row: false }, "delay", EXPOSURE_DELAY_SIGMA),
+            TermEntry::at(At::Exposure { by_row: true }, "row", ROW_TIME_SIGMA),
+        ],
+        says: "camera {camera} exposes its rows one after another while the arm moves",
+        needs: &[Need::Velocities],
         ..Family::PLAIN
     };
     /// Displacement of a joint's coordinate, or small motion of the base, proportional to a

@@ -86,6 +86,15 @@ impl Effect {
         }
     }
 
+    /// Returns the name of the camera on whose images the effect acts; `None` if there is none.
+    pub(crate) fn camera(&self) -> Option<String> {
+        let (key, _) = self.key_of(|kind| kind == ArgumentKind::Camera)?;
+        match self.argument(key)? {
+            Argument::Name(name) => Some(name),
+            _ => None,
+        }
+    }
+
     /// Returns key and kind of the first argument for whose kind `is_wanted` is true; `None` if
     /// there is none.
     fn key_of(

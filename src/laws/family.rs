@@ -143,6 +143,12 @@ pub enum At {
     Scale,
     /// Entry of the strain of the measuring frame, by its index: xx, yy, zz, xy, xz, yz.
     Strain(usize),
+    /// Time between the reading of the joints and the exposure of a pixel, constant or per row of
+    /// the image.
+    Exposure {
+        /// True for the time per row of the image.
+        by_row: bool,
+    },
 }
 
 /// Rule for the prior size (1 σ) of a parameter, or for its nominal value, on an arm; SI.
@@ -222,6 +228,8 @@ pub enum Need {
     Play,
     /// Requires a recorded covariate that varies.
     Covariate,
+    /// Requires recorded velocities of joints that are not all zero.
+    Velocities,
 }
 
 /// Rule for the trial values of an effect's searched or listed argument.

@@ -87,6 +87,29 @@ impl Numbering {
         nearest(name, plain.chain(approach).chain(measured).filter(lacking))
     }
 
+    /// Returns the meaning of a column with the velocity of a joint, such as `qd1_deg_per_s`; `None` for
+    /// other columns.
+    fn velocity(&self, name: &str, problem: &Problem) -> Option<Result<Meaning, InputErrorKind>> {
+        let (base, suffix) = split_unit(name);
+        let number = numbered(base, "qd")?;
+        let unit = |joint: &usize| unit_of(problem.joints.get(*joint)?.command_kind());
+        let Some((joint, unit)) = self.joint(number).and_then(|of| Some((of, unit(&of)?))) else {
+            return Some(Ok(Meaning::Ignored(joint_ignored(problem, number))));
+        };
+        let per_second = suffix.and_then(|suffix| unit.suffix(suffix.strip_suffix("_per_s")?));
+        Some(match per_second {
+            Some(suffix) => Ok(Meaning::Read(Role::Velocity(joint), suffix.to_si)),
+            None => Err(InputErrorKind::NeedsUnit {
+                noun: "a velocity",
+                write: unit
+                    .spellings(base)
+                    .map(|of| of + "_per_s")
+                    .collect::<Vec<_>>()
+                    .join(" or "),
+            }),
+        })
+    }
+
     /// Returns the meaning of a column's name; an error if its unit is missing or wrong.
     pub fn recognise(&self, name: &str, problem: &Problem) -> Result<Meaning, InputErrorKind> {
         if let Some(meaning) = by_joint_name(name, problem) {
@@ -105,6 +128,9 @@ impl Numbering {
                 Some(joint) => plain(Role::Approach(joint)),
                 None => Ok(Meaning::Ignored(joint_ignored(problem, number))),
             };
+        }
+        if let Some(velocity) = self.velocity(name, problem) {
+            return velocity;
         }
         let underscored = columns_with_unit().filter(|(known, ..)| known.contains('_'));
         if let Some((base, role, unit, _)) = underscored

@@ -114,8 +114,7 @@ pub struct Measurements {
     pub positions: Vec<Vector3<f64>>,
     /// True if the positions were measured; false for planned poses.
     pub position_measured: bool,
-    /// Unit of the positions in the first file in m (1/1000 for millimetres); `None` without a file
-    /// or without positions.
+    /// Unit of the positions in the first file \[m\]; `None` without a file or positions.
     pub position_unit: Option<f64>,
     /// Measured orientations of the target in the measuring frame; `None` if a column is missing.
     /// Rows that measure no position have the identity.
@@ -133,11 +132,12 @@ pub struct Measurements {
     pub time: Vec<f64>,
     /// True if `time` was recorded, false if it is the row number.
     pub time_measured: bool,
-    /// Direction from which each joint approached its command, −1, 0 or +1, shape = (rows, joints);
-    /// 0 for joints without a column.
+    /// Direction from which each joint approached, −1, 0 or +1, shape = (rows, joints).
     pub approach: Option<Vec<f64>>,
-    /// Values of the declared covariates in their order and units, shape = (rows, covariates);
-    /// empty if there are none.
+    /// Velocities of the joints, shape = (rows, joints) \[rad/s\] or \[m/s\]; 0 without a column.
+    #[doc(hidden)]
+    pub velocities: Option<Vec<f64>>,
+    /// Values of the declared covariates in their order and units, shape = (rows, covariates).
     pub covariates: Vec<f64>,
     /// Pose numbers from the column `pose`, if every row has a number there.
     pub pose: Option<Vec<f64>>,
@@ -438,14 +438,13 @@ impl Measurements {
             time: pick(&self.time),
             time_measured: self.time_measured,
             approach: self.approach.as_deref().map(each),
+            velocities: self.velocities.as_deref().map(each),
             covariates: rows.iter().flat_map(|&row| self.covariates_of(row)).copied().collect(),
             pose: self.pose.as_deref().map(pick),
             pose_names: self.pose_names.as_ref().map(words),
             session: words(&self.session),
             target: self.target.as_ref().map(words),
-            marked_held_out: self
-                .marked_held_out
-                .as_ref()
+            marked_held_out: (self.marked_held_out.as_ref())
                 .map(|marked| rows.iter().map(|&row| marked[row]).collect()),
             has_decimal_commas: self.has_decimal_commas,
             clock_offsets: self.clock_offsets.clone(),
@@ -480,6 +479,7 @@ impl Measurements {
         joined.temperature = both([&self.temperature, &other.temperature]);
         joined.time.extend(&other.time);
         joined.approach = both([&self.approach, &other.approach]);
+        joined.velocities = both([&self.velocities, &other.velocities]);
         joined.covariates.extend(&other.covariates);
         joined.pose = both([&self.pose, &other.pose]);
         joined.session.of_row.extend(&other.session.of_row);

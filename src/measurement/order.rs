@@ -167,6 +167,13 @@ impl PoseTable for Measurements {
             approaches: columns.approaches.get(begin * n..at * n).unwrap_or_default(),
         }
     }
+
+    fn exposed(&self, row: usize, camera: usize) -> Option<(&[f64], f64)> {
+        let velocities = self.velocities.as_deref()?;
+        let of_row = velocities.get(row * self.joints..(row + 1) * self.joints)?;
+        let is_of_camera = self.observation(row).fixtures()[0] == Some(camera);
+        is_of_camera.then(|| (of_row, self.positions[row].y))
+    }
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ pub(super) enum Role {
     Time,
     /// Direction from which a joint approached.
     Approach(usize),
+    /// Velocity of a joint.
+    Velocity(usize),
     /// Angle rx, ry or rz of an orientation.
     Orientation(usize),
     /// Component qx, qy, qz or qw of an orientation.

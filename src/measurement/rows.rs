@@ -47,7 +47,9 @@ impl RowsBuilder {
         let names_targets = !problem.targets.is_empty();
         let mut others = kinds().filter(|kind| !kind.declared_by.is_empty());
         let has_other_kinds = others.any(|kind| is_declared(kind, problem));
-        let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
+        let has = |is_it: fn(Role) -> bool| columns.read.iter().any(|column| is_it(column.role));
+        let approach = has(|role| matches!(role, Role::Approach(_)));
+        let velocities = has(|role| matches!(role, Role::Velocity(_)));
         let measurements = Measurements {
             files: files.to_vec(),
             joints: problem.joints.len(),
@@ -65,6 +67,7 @@ impl RowsBuilder {
             temperature: list(Role::Temperature),
             time_measured: columns.has(Role::Time),
             approach: approach.then(Vec::new),
+            velocities: velocities.then(Vec::new),
             target: (names_targets || columns.has(Role::Target)).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
             has_decimal_commas: table.style.decimal_comma && table.style.delimiter != ',',
@@ -200,8 +203,8 @@ impl RowsBuilder {
         if let Some(other) = &mut measurements.other_configurations {
             other.resize((row + 1) * joints, 0.0);
         }
-        if let Some(approach) = &mut measurements.approach {
-            approach.resize((row + 1) * joints, 0.0);
+        for column in [&mut measurements.approach, &mut measurements.velocities] {
+            column.iter_mut().for_each(|of_joints| of_joints.resize((row + 1) * joints, 0.0));
         }
         if !measurements.time_measured {
             measurements.time.push(row as f64);
@@ -252,6 +255,12 @@ impl RowsBuilder {
                     let direction = direction(table, column)?;
                     if let Some(approach) = &mut measurements.approach {
                         set(approach, row * joints + joint, direction);
+                    }
+                }
+                Role::Velocity(joint) => {
+                    let velocity = number()?;
+                    if let Some(velocities) = &mut measurements.velocities {
+                        set(velocities, row * joints + joint, velocity);
                     }
                 }
                 Role::Orientation(axis) => set(turned.angles.as_mut_slice(), axis, number()?),

@@ -3,7 +3,7 @@
 
 use super::command_term::{CommandTerm, TermSite};
 use super::harmonic_sum::HarmonicSum;
-use crate::model::parameter::{Parameter, Waves};
+use crate::model::parameter::{Parameter, ParameterSite, Regressor, Waves};
 use crate::problem::{JointOffsets, PoseView};
 
 /// Sum of the terms that add to joint coordinates, strains and small motions, evaluated for one
@@ -13,6 +13,9 @@ pub(super) struct CommandTerms {
     series: Vec<HarmonicSum>,
     /// Terms that are evaluated one by one, because no [`HarmonicSum`] contains them.
     others: Vec<CommandTerm>,
+    /// Times of exposures \[s\], which move all joints: index of the camera, true for a time per row of
+    /// the image, and the time.
+    exposures: Vec<(usize, bool, f64)>,
     configuration: Vec<f64>,
     offsets: Vec<JointOffsets>,
 }
@@ -23,18 +26,28 @@ impl CommandTerms {
     pub fn new(fixed: &[CommandTerm], parameters: &[Parameter], x: &[f64]) -> Self {
         let mut others = CommandTerm::fixed_and_free(fixed, parameters, x);
         let series = HarmonicSum::take_from(&mut others);
-        Self { series, others, ..Self::default() }
+        let exposure = |(parameter, &time): (&Parameter, &f64)| match parameter.site {
+            ParameterSite::Exposure { camera, by_row } => Some((camera, by_row, time)),
+            _ => None,
+        };
+        let exposures = parameters.iter().zip(x).filter_map(exposure).collect();
+        Self { series, others, exposures, ..Self::default() }
     }
 
     /// Returns the pose with all terms added to its configuration, strains and motions.
     #[inline]
     pub fn apply<'b>(&'b mut self, setup: &PoseView<'b>) -> PoseView<'b> {
-        if self.others.is_empty() && self.series.is_empty() {
+        if self.others.is_empty() && self.series.is_empty() && self.exposures.is_empty() {
             return *setup;
         }
         self.configuration.clear();
         self.configuration.extend_from_slice(setup.configuration);
         self.offsets.clear();
+        for &(camera, by_row, time) in &self.exposures {
+            for (joint, coordinate) in self.configuration.iter_mut().enumerate() {
+                *coordinate += time * Regressor::Exposure { camera, joint, by_row }.value(setup);
+            }
+        }
         let mut waves = Waves::default();
         let others = self
             .others
@@ -65,7 +78,6 @@ impl CommandTerms {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::parameter::Regressor;
     use crate::problem::Problem;
 
     #[test]

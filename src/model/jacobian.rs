@@ -81,6 +81,7 @@ impl<'m> JacobianWriter<'m> {
                 }
                 ParameterSite::Joint { .. }
                 | ParameterSite::Beam { .. }
+                | ParameterSite::Exposure { .. }
                 | ParameterSite::Arm(_) => {}
             }
         }

@@ -39,10 +39,10 @@ use nalgebra::Vector3;
 use crate::error::InputError;
 use crate::mechanics::{Arm, Joint};
 use crate::model::parameter::{
-    LinearConstraint, Parameter, ParameterSite, Regressor, resolve, resolve_constraints,
+    JointField, LinearConstraint, Parameter, ParameterSite, Regressor, resolve, resolve_constraints,
 };
 use crate::observation::{FixtureValues, Observation};
-use crate::problem::{BasePose, Effect, Fixture, Problem};
+use crate::problem::{BasePose, Effect, Fixture, JointKind, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 use command_term::CommandTerm;
@@ -165,6 +165,13 @@ impl Model {
             sites::add_spring(&mut model.nominal, effect);
         }
         model
+    }
+
+    /// Returns the site of the coordinate that the command of a joint, counted from 0, moves.
+    fn coordinate(&self, joint: usize) -> ParameterSite {
+        let slides = self.nominal.joints[joint].kind == JointKind::Prismatic;
+        let field = if slides { JointField::D } else { JointField::Theta };
+        ParameterSite::Joint { joint, field }
     }
 
     /// Returns the number of joints, fixed ones included.

@@ -51,14 +51,14 @@ impl Rows<'_> {
         }
     }
 
-    /// Writes the column of each parameter that acts on `input`: `derivative` with respect to the
+    /// Adds to the column of each parameter that acts on `input`: `derivative` with respect to the
     /// input times the parameter's regressor in the `commanded` pose.
     #[inline]
     pub fn put_input(&mut self, input: &Input, commanded: &PoseView, derivative: &Vector3<f64>) {
         self.put_if(input.column, || *derivative);
         let mut waves = Waves::default();
         for (column, regressor) in &input.regressors {
-            self.put(*column, &(derivative * waves.value(regressor, commanded)));
+            self.add(*column, &(derivative * waves.value(regressor, commanded)));
         }
     }
 }
@@ -87,8 +87,23 @@ pub(super) struct Input {
 /// Returns the inputs of the arm that the parameters of these Jacobian columns act on.
 pub(super) fn inputs(model: &Model, columns: &[JacobianColumn]) -> Vec<Input> {
     let mut inputs: Vec<Input> = Vec::new();
+    let input_at = |inputs: &mut Vec<Input>, site: ParameterSite| {
+        inputs.iter().position(|input| input.site == site).unwrap_or_else(|| {
+            inputs.push(Input { site, parameter: None, column: None, regressors: Vec::new() });
+            inputs.len() - 1
+        })
+    };
     for (index_of_column, column) in columns.iter().enumerate() {
         let site = column.site;
+        // The time of an exposure acts on the coordinates of all joints.
+        if let ParameterSite::Exposure { camera, by_row } = site {
+            for joint in 0..model.joints() {
+                let index = input_at(&mut inputs, model.coordinate(joint));
+                let regressor = Regressor::Exposure { camera, joint, by_row };
+                inputs[index].regressors.push((index_of_column, regressor));
+            }
+            continue;
+        }
         let is_of_arm = matches!(
             site,
             ParameterSite::Joint { .. } | ParameterSite::Beam { .. } | ParameterSite::Arm(_)
@@ -96,11 +111,7 @@ pub(super) fn inputs(model: &Model, columns: &[JacobianColumn]) -> Vec<Input> {
         if !is_of_arm && model.payload_axis(site).is_none() {
             continue;
         }
-        let existing = inputs.iter().position(|input| input.site == site);
-        let index = existing.unwrap_or_else(|| {
-            inputs.push(Input { site, parameter: None, column: None, regressors: Vec::new() });
-            inputs.len() - 1
-        });
+        let index = input_at(&mut inputs, site);
         let input = &mut inputs[index];
         if column.regressor.is_constant() {
             (input.parameter, input.column) = (column.parameter, Some(index_of_column));

@@ -68,6 +68,7 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
         | ParameterSite::Fixture { .. }
         | ParameterSite::Shift { .. }
         | ParameterSite::Turn { .. }
+        | ParameterSite::Exposure { .. }
         | ParameterSite::Scale
         | ParameterSite::Strain { .. } => {}
     }
@@ -169,6 +170,7 @@ pub(super) fn set_site<S: Scalar>(
         | ParameterSite::Fixture { .. }
         | ParameterSite::Shift { .. }
         | ParameterSite::Turn { .. }
+        | ParameterSite::Exposure { .. }
         | ParameterSite::Scale
         | ParameterSite::Strain { .. } => {}
     }

@@ -50,6 +50,7 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
             ArgumentKind::Mount => return self.read_mount(key),
             ArgumentKind::Beam => return self.read_beam(key),
             ArgumentKind::Covariate => return self.read_covariate(key),
+            ArgumentKind::Camera => return self.read_camera(key),
             ArgumentKind::Orders => return self.read_orders(key),
             ArgumentKind::Order => return self.read_order(key),
             ArgumentKind::Time => return self.read_time(key),
@@ -121,6 +122,13 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
         let item = self
             .section
             .require(key, &format!("{key} = \"…\", the name of a column in [data.covariates]"))?;
+        Ok(Argument::Name(item.text()?.to_owned()))
+    }
+
+    /// Reads the name of a camera. Its existence is checked when all sections are read.
+    fn read_camera(&mut self, key: &str) -> Result<Argument, InputError> {
+        let item =
+            self.section.require(key, &format!("{key} = \"…\", the name of a [[camera]]"))?;
         Ok(Argument::Name(item.text()?.to_owned()))
     }
 
@@ -249,6 +257,10 @@ impl ArgumentKind {
             Self::Covariate => {
                 let covariate = problem.data.covariates.first();
                 quoted(covariate.map_or("tilt_deg", |covariate| &covariate.name))
+            }
+            Self::Camera => {
+                let camera = problem.fixtures.iter().find(|of| of.kind.word() == "camera");
+                quoted(camera.map_or("hand", |camera| &camera.name))
             }
             Self::Beam => {
                 let beam = joints.iter().find_map(|joint| joint.beam.as_ref());

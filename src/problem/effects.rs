@@ -9,7 +9,7 @@ use super::effect::example;
 use super::item::{Document, Item};
 use super::law;
 use super::section::Section;
-use super::{Data, Effect, EffectDeclaration, Joint, Problem, Statics};
+use super::{Data, Effect, EffectDeclaration, Fixture, Joint, Problem, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::laws::{Argument, FAMILIES, LAW, NAMES};
 
@@ -48,6 +48,22 @@ pub(super) fn check(
 ) -> Result<(), InputError> {
     effects.iter().try_for_each(|declared| check_alone(declared, statics, joints, data))?;
     check_compensators(effects, joints)
+}
+
+/// Returns an error if an effect names a camera that the problem does not declare.
+pub(super) fn check_cameras(
+    effects: &[EffectDeclaration],
+    fixtures: &[Fixture],
+) -> Result<(), InputError> {
+    let cameras = fixtures.iter().filter(|fixture| fixture.kind.word() == "camera");
+    let known: Vec<String> = cameras.map(|camera| camera.name.clone()).collect();
+    for EffectDeclaration { effect, location } in effects {
+        if let Some(name) = effect.camera().filter(|name| !known.contains(name)) {
+            let kind = InputErrorKind::UnknownFixture { what: "camera", name, known };
+            return Err(location.clone().error(kind));
+        }
+    }
+    Ok(())
 }
 
 /// Returns an error if an effect could never act on this arm, regardless of other effects.

@@ -46,6 +46,13 @@ impl Past {
 pub(crate) trait PoseTable: Sync {
     /// Returns the earlier poses of a row.
     fn past(&self, row: usize) -> Past<&[f64]>;
+
+    /// Returns the velocities of the joints \[rad/s\] or \[m/s\] and the row of the image \[px\] if a
+    /// row of the table measures a pixel of the camera with this index among the fixtures and
+    /// velocities are recorded.
+    fn exposed(&self, _row: usize, _camera: usize) -> Option<(&[f64], f64)> {
+        None
+    }
 }
 
 /// Provides itself as the past of a single pose.
@@ -66,6 +73,11 @@ impl<'a> LazyPast<'a> {
     /// Returns the past of a row of a table.
     pub(crate) fn row(table: &'a dyn PoseTable, row: u32) -> Self {
         Self { table: Some(table), row }
+    }
+
+    /// Returns the velocities and the row of the image of [`PoseTable::exposed`].
+    pub(crate) fn exposed(self, camera: usize) -> Option<(&'a [f64], f64)> {
+        self.table?.exposed(self.row as usize, camera)
     }
 
     /// Returns the index of the pose's row in its table (0 for a single pose), or `None` without a

@@ -116,6 +116,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let remainder = remainder::read(&mut root)?;
     root.finish()?;
     effects::check(&effects, statics, &joints, &data)?;
+    effects::check_cameras(&effects, &fixtures)?;
     Ok(Problem {
         name,
         title,

@@ -29,6 +29,8 @@ pub enum Covariate {
     Load,
     /// Measured position of the target, measuring frame \[m\].
     Position,
+    /// Velocities of the joints.
+    Velocity,
     /// Covariate that the user declares, by the name of its column, in the column's unit.
     Declared(Arc<str>),
 }
@@ -82,6 +84,7 @@ impl fmt::Display for Covariate {
             Self::Approach(joint) => write!(f, "approach{}", joint + 1),
             Self::Load => f.write_str("load"),
             Self::Position => f.write_str("position"),
+            Self::Velocity => f.write_str("velocity"),
             Self::Declared(name) => f.write_str(name),
         }
     }

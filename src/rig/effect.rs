@@ -154,6 +154,7 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         Effect::GravityDirection => about_xy(Unit::Angle),
         Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
         Effect::TrackerDrift => xyz(Unit::Speed),
+        Effect::RollingShutter { .. } => named(&[("delay", Unit::Time), ("row", Unit::Time)]),
         Effect::PayloadPosition | Effect::StationShift { .. } | Effect::TrackerSettling { .. } => {
             xyz(Unit::Length)
         }

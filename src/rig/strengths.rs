@@ -56,6 +56,11 @@ fn located_effect(
     {
         return Err(item.error(kind));
     }
+    if matches!(&cause, Cause::Catalogued(effect) if effect.camera().is_some()) {
+        return Err(item.error(InputErrorKind::NeedsColumn {
+            write: "velocities of the joints; simulated images are of an arm at rest",
+        }));
+    }
     if matches!(&cause, Cause::Catalogued(effect) if effect.covariate().is_some())
         && poses.covariates.is_empty()
     {

@@ -158,6 +158,10 @@ impl<'a> Data<'a> {
             payload: payload.map_or([problem.tool.payload_mass; 2].into(), range),
             ranges: (0..n).map(column).collect(),
             covariates: self.declared_covariates().map(varies).collect(),
+            velocities: measurements.velocities.as_ref().is_some_and(|velocities| {
+                let of_row = |row: usize| &velocities[row * n..(row + 1) * n];
+                self.rows().iter().any(|&row| of_row(row).iter().any(|of_joint| *of_joint != 0.0))
+            }),
             times: self.shift_times(),
             clock: measurements.clock(),
             gravity: problem.gravity,

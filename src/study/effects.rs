@@ -114,6 +114,7 @@ pub(super) fn check(
         approach,
         time: true,
         covariates: !covariates.is_empty(),
+        velocities: false,
     };
     for declared in &problem.effects {
         if declared.effect.is_thermal() && !columns.temperature {

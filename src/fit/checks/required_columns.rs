@@ -58,6 +58,7 @@ fn missing_columns(
         temperature: rows.temperature.is_some(),
         approach: rows.approach.is_some(),
         time,
+        velocities: rows.velocities.is_some(),
         covariates: rows.covariates.len() == problem.data.covariates.len() * rows.len(),
     };
     let needs = move |EffectDeclaration { effect, location }: &EffectDeclaration| {

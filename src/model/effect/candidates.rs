@@ -92,6 +92,10 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
                 let beams = problem.joints.iter().filter_map(|joint| joint.beam.as_ref());
                 beams.map(|beam| Argument::Name(beam.name.clone())).collect()
             }
+            ArgumentKind::Camera => {
+                let cameras = problem.fixtures.iter().filter(|of| of.kind.word() == "camera");
+                cameras.map(|camera| Argument::Name(camera.name.clone())).collect()
+            }
             ArgumentKind::Covariate => {
                 let covariates = problem.covariate_names();
                 // The candidates are ordered by covariate: each covariate at every place.
@@ -269,6 +273,9 @@ impl Effect {
                 "no columns approach1 …, and a sliding joint has no moment of the loads that \
                  tells the side",
             ),
+            Need::Velocities => {
+                unless(data.velocities, "no columns qd1_deg_per_s … of an arm that moves")
+            }
             Need::Loads | Need::Play => unless(data.has_gravity(), NO_LOADS),
             Need::Covariate => {
                 let name = self.covariate();

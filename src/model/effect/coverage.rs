@@ -26,6 +26,8 @@ pub struct DataCoverage {
     pub clock: Option<(f64, f64)>,
     /// For each covariate of the problem, true if it is recorded and varies.
     pub covariates: Vec<bool>,
+    /// True if velocities of joints are recorded and not all zero.
+    pub velocities: bool,
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<f64>,
     /// True if a part that the problem declares gives way to loads.
@@ -88,4 +90,6 @@ pub struct Columns {
     pub time: bool,
     /// True if all covariates of the problem are present.
     pub covariates: bool,
+    /// True if the table has velocities of joints.
+    pub velocities: bool,
 }

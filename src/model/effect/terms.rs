@@ -2,9 +2,9 @@
 
 use super::coverage::Columns;
 use crate::laws::expression::Vocabulary;
-use crate::laws::{At, Effect, EffectTerm, JointField, LAW, LawParameter, Quantity};
+use crate::laws::{At, Effect, EffectTerm, JointField, LAW, LawParameter, Need, Quantity};
 use crate::model::parameter::{EffectParameter, ParameterSite, Regressor};
-use crate::problem::{JointKind, Problem};
+use crate::problem::{Fixture, JointKind, Problem};
 
 /// Parameter of an effect on an arm, with the site where it enters the model.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,6 +105,12 @@ impl Effect {
             }
             At::Scale => ParameterSite::Scale,
             At::Strain(entry) => ParameterSite::Strain { entry },
+            At::Exposure { by_row } => {
+                let name = self.camera()?;
+                let is_named = |of: &Fixture| of.kind.word() == "camera" && of.name == name;
+                let camera = problem.fixtures.iter().position(is_named)?;
+                ParameterSite::Exposure { camera, by_row }
+            }
         })
     }
 
@@ -172,6 +178,11 @@ impl Effect {
                 "a column time_s",
             ),
             (approach, columns.approach, "columns approach1, …"),
+            (
+                self.has_need(&[Need::Velocities]),
+                columns.velocities,
+                "columns qd1_deg_per_s, …, the velocities of the joints",
+            ),
             (
                 follows(|quantity| matches!(quantity, Quantity::Covariate(_))),
                 columns.covariates,

@@ -26,6 +26,16 @@ pub enum Regressor {
     Cosine(usize, u32),
     /// Formula that is no harmonic of integer order.
     Formula(Arc<Formula>),
+    /// Velocity of a joint in the row of a pixel \[rad/s\] or \[m/s\], times the row of the image if
+    /// `by_row` is true; 0 for other rows, and if no velocities are recorded.
+    Exposure {
+        /// Index of the camera among the fixtures.
+        camera: usize,
+        /// Index of the joint.
+        joint: usize,
+        /// True if the row of the image multiplies the velocity.
+        by_row: bool,
+    },
     /// Marker of a parameter inside formulas: it multiplies nothing (value 0).
     Inner,
     /// Derivative of formulas with respect to a parameter inside them, or to a load whose moments
@@ -280,7 +290,7 @@ impl Regressor {
         };
         match self {
             Self::Constant | Self::Unit => Expression::Number(1.0),
-            Self::Inner | Self::Slope(_) => Expression::Number(0.0),
+            Self::Inner | Self::Slope(_) | Self::Exposure { .. } => Expression::Number(0.0),
             Self::Sine(joint, order) => wave(true, *joint, *order),
             Self::Cosine(joint, order) => wave(false, *joint, *order),
             Self::Formula(formula) => formula.expression.clone(),
@@ -303,7 +313,9 @@ impl Regressor {
     /// Returns the quantities of a pose that the regressor depends on.
     pub fn quantities(&self) -> Vec<Quantity> {
         match self {
-            Self::Constant | Self::Unit | Self::Inner | Self::Slope(_) => Vec::new(),
+            Self::Constant | Self::Unit | Self::Inner | Self::Slope(_) | Self::Exposure { .. } => {
+                Vec::new()
+            }
             Self::Sine(joint, _) | Self::Cosine(joint, _) => vec![Quantity::Command(*joint)],
             Self::Formula(formula) => formula.expression.quantities(),
         }
@@ -355,6 +367,14 @@ impl Regressor {
     pub fn value(&self, setup: &PoseView) -> f64 {
         match self {
             Self::Constant | Self::Unit => 1.0,
+            Self::Exposure { camera, joint, by_row } => {
+                let exposed = setup.past.exposed(*camera);
+                exposed.map_or(0.0, |(velocities, row)| {
+                    velocities
+                        .get(*joint)
+                        .map_or(0.0, |velocity| if *by_row { velocity * row } else { *velocity })
+                })
+            }
             Self::Sine(joint, order) => (f64::from(*order) * setup.configuration[*joint]).sin(),
             Self::Cosine(joint, order) => (f64::from(*order) * setup.configuration[*joint]).cos(),
             Self::Formula(formula) => formula.value(setup),

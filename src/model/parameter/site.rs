@@ -61,6 +61,14 @@ pub enum ParameterSite {
         /// Axis 0, 1 or 2.
         axis: usize,
     },
+    /// Time from the reading of the joints to the exposure of a pixel of a camera, by which the
+    /// joints move on with their recorded velocities.
+    Exposure {
+        /// Index of the camera among the fixtures.
+        camera: usize,
+        /// True for the time per row of the image, false for that of its first row.
+        by_row: bool,
+    },
     /// Relative scale error s of the instrument: a position p reads as p (1 + s).
     Scale,
     /// Entry of the strain E of the measuring frame: p reads as p + E p. E is triangular, in the
@@ -135,6 +143,7 @@ impl ParameterSite {
             Self::Turn { .. } => Unit::Angle,
             Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } => Unit::Length,
             Self::Fixture { kind, axis, .. } => kind.unit(axis),
+            Self::Exposure { .. } => Unit::Time,
             Self::Scale | Self::Strain { .. } => Unit::Ratio,
         }
     }
@@ -154,6 +163,7 @@ impl ParameterSite {
             | Self::Fixture { .. }
             | Self::Shift { .. }
             | Self::Turn { .. }
+            | Self::Exposure { .. }
             | Self::Scale
             | Self::Strain { .. } => false,
         }

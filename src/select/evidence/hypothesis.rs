@@ -54,6 +54,7 @@ impl Site {
             ParameterSite::Base { .. } | ParameterSite::Turn { .. } => Self::Base,
             ParameterSite::Target { .. } => Self::Payload,
             ParameterSite::Fixture { .. }
+            | ParameterSite::Exposure { .. }
             | ParameterSite::Shift { .. }
             | ParameterSite::Scale
             | ParameterSite::Strain { .. } => Self::Measurement,
@@ -215,6 +216,7 @@ fn covariates(
         }
         ParameterSite::Arm(ArmField::Payload | ArmField::PayloadAt(_)) => Covariate::Payload,
         ParameterSite::Scale | ParameterSite::Strain { .. } => Covariate::Position,
+        ParameterSite::Exposure { .. } => Covariate::Velocity,
         _ => Covariate::Load,
     }]
 }

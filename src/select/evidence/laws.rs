@@ -242,8 +242,9 @@ fn elsewhere(
         };
         // Laws elsewhere than at a joint are no functions of the moments of the loads or of the
         // position.
-        let can_be_in_formula =
-            |covariate: &Covariate| !matches!(covariate, Covariate::Load | Covariate::Position);
+        let can_be_in_formula = |covariate: &Covariate| {
+            !matches!(covariate, Covariate::Load | Covariate::Position | Covariate::Velocity)
+        };
         is_listed
             && hypothesis.depends_on.iter().any(can_be_in_formula)
             && joint_of(hypothesis, problem).is_none()

@@ -431,7 +431,7 @@ fn value(covariate: &Covariate, setup: &PoseView, names: &[String]) -> Option<f6
         Covariate::Hoist => setup.hoist.copied(),
         Covariate::Time | Covariate::Row => Some(setup.elapsed),
         Covariate::Approach(joint) => setup.approach.map(|sides| sides[*joint]),
-        Covariate::Load | Covariate::Position => None,
+        Covariate::Load | Covariate::Position | Covariate::Velocity => None,
         Covariate::Declared(name) => {
             let index = names.iter().position(|other| other.as_str() == &**name)?;
             setup.covariates.get(index).copied()
