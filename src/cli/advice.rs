@@ -196,11 +196,12 @@ fn holds_a_wrong_fixture(found: &Identification) -> bool {
 }
 
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared
-/// problem to rows of `measured_poses` poses, and `results` are the files that the loop wrote.
+/// problem to rows of `measured_poses` poses, `after` that with what was added, and `results` are the
+/// files that the loop wrote.
 pub fn after_loop(
     common: &Common,
     problem: &Problem,
-    (fit, measured_poses): (&Identification, usize),
+    (fit, after, measured_poses): (&Identification, &Identification, usize),
     result: &LoopResult,
     results: &Results,
 ) -> String {
@@ -213,10 +214,16 @@ pub fn after_loop(
         return "the same command again, to search to the end".to_owned();
     }
     if !result.trusted {
-        return format!("flexcal identify {named} -v, once the input is corrected");
+        return format!("flexcal identify {named} -v, once what the warnings name is corrected");
     }
     if report::lacks_masses(result) {
         return format!("declare the masses in {file}, then flexcal loop {named}");
+    }
+    if let Some(held) = after.finding(FindingCode::HeldParameter)
+        && let Some(name) =
+            held.word("parameter").filter(|_| result.verdict == Verdict::Unexplained)
+    {
+        return format!("free {name} in {file}, as the warning says, then flexcal loop {named}");
     }
     if result.structures().any(|left| left.limit.is_some()) {
         return format!(

@@ -175,10 +175,16 @@ impl Common {
         Dataset::from_measurements(problem, measurements)
     }
 
-    /// Warns if `rows` lack a load that the rows of an estimate had.
-    pub fn warn_of_loads(&self, problem: &Problem, estimate: &SavedEstimate, rows: &Measurements) {
+    /// Warns if `rows` lack a load that the rows of an estimate had, and returns true then.
+    pub fn warn_of_loads(
+        &self,
+        problem: &Problem,
+        estimate: &SavedEstimate,
+        rows: &Measurements,
+    ) -> bool {
         let missing = fit::missing_loads(problem, estimate, rows);
-        self.hint(missing);
+        self.hint(&missing);
+        !missing.is_empty()
     }
 
     /// Prints a warning if no parameter of the arm is free, unless the command is quiet.

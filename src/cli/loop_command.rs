@@ -112,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             data.split.identification.iter().filter_map(|&row| poses.get(row).copied()).collect();
         fitted.sort_unstable();
         fitted.dedup();
-        let fit = (&closure.before.fit, fitted.len());
+        let fit = (&closure.before.fit, &closure.after, fitted.len());
         let next = advice::after_loop(common, &problem, fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())
     })?;

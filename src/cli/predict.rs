@@ -70,9 +70,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");
     }
-    if let Some(estimate) = &estimate {
-        common.warn_of_loads(&problem, estimate, &rows);
-    }
+    let lacks_loads =
+        estimate.as_ref().is_some_and(|estimate| common.warn_of_loads(&problem, estimate, &rows));
     // Rows without a split are predicted too. A random split applies only to the rows of the
     // problem, not to new rows.
     let is_random_split = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
@@ -128,7 +127,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
     // Bounds of an estimate that is not trusted say nothing.
     let judged = compared.filter(|_| trusted);
-    let story = report::prediction(&problem, arm, &prediction, (judged, &fitted));
+    let story = report::prediction(&problem, arm, &prediction, (judged, &fitted, lacks_loads));
     texts.push((RESULT_FILES[3], story.page()));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
@@ -146,6 +145,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             ),
             _ if warnings.iter().any(|warning| warning.kind.doubts_table()) => {
                 "correct the table as the warning says, then the same command".to_owned()
+            }
+            _ if lacks_loads && test.is_some_and(|of| of.is_contradicted()) => {
+                "add the column of loads that the warning names, then the same command".to_owned()
             }
             (Some(file), _) if fitted.is_empty() && test.is_some_and(|of| of.is_contradicted()) => format!(
                 "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than \

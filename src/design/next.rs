@@ -254,7 +254,7 @@ pub fn next(
             if is_of_cameras { DesignError::NothingInView } else { DesignError::NoEquilibrium };
         return Err(nothing.into());
     }
-    let size = MisfitSize::of(&found, has_declared_noise);
+    let size = MisfitSize::of(&found, (has_declared_noise, problem.data.position_sigma));
     let misfit = (!is_of_cameras).then(|| Misfit::new(&site, &reference, size.misfit, seed));
     let mut unknowns = Unknowns::of(&site.model.parameters);
     let coordinates = sensitivity.coordinates;

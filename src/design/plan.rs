@@ -14,7 +14,7 @@ use super::next::mean_square;
 use super::{
     Criterion, DesignError, Exchange, ExchangeResult, Forecast, Sensitivity, Site, Workspace,
 };
-use crate::measurement::Measurements;
+use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
 use crate::numeric::median;
 use crate::numeric::parallel;
@@ -80,8 +80,12 @@ pub struct PlanProgress {
 pub struct Plan {
     /// Planned poses; in the order of the table if the candidates are its rows.
     pub poses: Measurements,
-    /// Number of given rows that are measured in any case, without known distances between points.
+    /// Number of given rows that are measured in any case and fitted, without known distances
+    /// between points.
     pub given: usize,
+    /// Number of given rows that are held out, and so do not count.
+    #[doc(hidden)]
+    pub held_out: usize,
     /// Number of candidates that were tried.
     pub candidates: usize,
     /// Number of poses drawn to find the first candidates; `None` if they are rows of a table, or
@@ -113,18 +117,47 @@ pub struct Plan {
 /// of threads.
 ///
 /// With ranges, candidates are drawn first and then varied around the best poses, ever closer to
-/// them. Poses in `given` are measured in any case.
+/// them. Poses in `given` are measured in any case, and count if they are not held out.
 ///
 /// # Errors
 /// Returns an error if there are fewer candidates than poses, or if the problem lacks a
 /// declaration.
-#[expect(clippy::too_many_lines, reason = "one result, listed field by field")]
 pub fn plan(
     problem: &Problem,
     candidates: &Candidates,
     given: Option<&Measurements>,
     options: &PlanOptions,
 ) -> Result<Plan, DesignError> {
+    plan_beside(problem, candidates, fitted_rows(problem, given).as_ref(), options)
+}
+
+/// Returns the given rows that a fit does not hold out, and the number of the others. Without a
+/// split, all rows are fitted.
+pub(super) fn fitted_rows(
+    problem: &Problem,
+    given: Option<&Measurements>,
+) -> Option<(Measurements, usize)> {
+    let given = given?;
+    Some(match Split::new(problem, given) {
+        Ok(split) => (given.select(&split.identification), split.held_out.len()),
+        Err(_) => (given.clone(), 0),
+    })
+}
+
+/// Chooses poses as [`plan()`] does, besides `given` rows that are all fitted. The second part of
+/// `given` is the number of rows that are held out.
+///
+/// # Errors
+/// Returns the errors of [`plan()`].
+#[expect(clippy::too_many_lines, reason = "one result, listed field by field")]
+pub(super) fn plan_beside(
+    problem: &Problem,
+    candidates: &Candidates,
+    given: Option<&(Measurements, usize)>,
+    options: &PlanOptions,
+) -> Result<Plan, DesignError> {
+    let held_out = given.map_or(0, |given| given.1);
+    let given = given.map(|given| &given.0);
     let PlanOptions { poses, criterion, seed, .. } = *options;
     if poses == 0 {
         return Err(DesignError::NoPoses);
@@ -234,6 +267,7 @@ pub fn plan(
     Ok(Plan {
         poses: chosen,
         given: given_arm_rows.map_or(0, |rows| rows.len()),
+        held_out,
         candidates: tried,
         drawn,
         starts,

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::drawn::{DRAWN_CANDIDATES, UNIFORM_STREAM};
-use super::plan::{RANDOM_SET_STREAM, RANDOM_SETS, choose};
-use super::{Candidates, Criterion, DesignError, Extremes, Plan, PlanOptions, Site, plan};
+use super::plan::{RANDOM_SET_STREAM, RANDOM_SETS, choose, fitted_rows, plan_beside};
+use super::{Candidates, Criterion, DesignError, Extremes, Plan, PlanOptions, Site};
 use crate::measurement::Measurements;
 use crate::numeric::median;
 use crate::problem::{Effect, EffectDeclaration, Problem};
@@ -97,7 +97,7 @@ pub struct PairSeparation {
 /// effects declared, and `options.criterion` is not used.
 ///
 /// # Errors
-/// Returns the errors of [`plan()`].
+/// Returns the errors of [`super::plan()`].
 pub fn separate(
     pair: &EffectPair,
     candidates: &Candidates,
@@ -112,13 +112,11 @@ pub fn separate(
         }
         Candidates::Rows(rows) => rows.as_ref().clone(),
     };
+    let fitted = fitted_rows(&pair.declared, given);
+    let given = fitted.as_ref().map(|(rows, _)| rows);
     let criterion = pair.criterion(given.unwrap_or(&uniform))?;
-    let plan = plan(
-        &pair.declared,
-        candidates,
-        given,
-        &PlanOptions { criterion: &criterion, ..*options },
-    )?;
+    let options = PlanOptions { criterion: &criterion, ..*options };
+    let plan = plan_beside(&pair.declared, candidates, fitted.as_ref(), &options)?;
     let with_given =
         |rows: &Measurements| given.map_or_else(|| rows.clone(), |given| given.concatenate(rows));
     let uniform = Site::new(&pair.declared, &[&uniform])?.in_equilibrium(&uniform).0;

@@ -4,6 +4,9 @@ use super::next::{NextPoses, NextStep};
 use super::workspace_error::normal_bound;
 use crate::fit::Noise;
 
+/// Smallest ratio of the assumed to the attainable error at which a text says that it is larger.
+const MIN_STATED_EXCESS: f64 = 1.05;
+
 impl NextPoses {
     /// Returns the number of chosen poses after which the error bound is expected to be at most
     /// `tolerance` \[m\]; `None` without a tolerance, or if no number suffices.
@@ -26,6 +29,14 @@ impl NextPoses {
         let bound = normal_bound(level) * 3_f64.sqrt() * self.noise;
         let is_below = |most| most < bound;
         self.found.noise == Noise::Declared && tolerance.is_some_and(is_below)
+    }
+
+    /// Returns true if noise and assumed misfit together exceed the error that no number of poses
+    /// lowers further.
+    #[doc(hidden)]
+    pub fn assumes_more_than_attainable(&self) -> bool {
+        let assumed = 3_f64.sqrt() * self.noise.hypot(self.misfit);
+        self.attainable.is_some_and(|least| assumed > MIN_STATED_EXCESS * least)
     }
 
     /// Returns true if the misfit of the model is known to exceed the noise. Without a declared σ

@@ -38,8 +38,9 @@ pub(super) struct MisfitSize {
 
 impl MisfitSize {
     /// Splits the variance of the residuals of a fit. The misfit is the part beyond the declared
-    /// noise; without declared noise, half of the variance is taken as noise.
-    pub fn of(found: &Identification, has_declared_noise: bool) -> Self {
+    /// noise; without declared noise, half of the variance is taken as noise. `declared` is the
+    /// declared σ of a position \[m\]: a fit with a prior may assume a larger one.
+    pub fn of(found: &Identification, (has_declared_noise, declared): (bool, Option<f64>)) -> Self {
         let identified: f64 = found
             .estimates
             .iter()
@@ -49,7 +50,11 @@ impl MisfitSize {
         let coordinates = found.coordinates as f64;
         let freedom = (coordinates - identified).max(0.0);
         let sum = found.fitted.identification.rms.norm.powi(2) / 3.0 * coordinates;
-        let noise = if has_declared_noise { found.sigma } else { found.sigma / 2_f64.sqrt() };
+        let noise = if has_declared_noise {
+            declared.unwrap_or(found.sigma)
+        } else {
+            found.sigma / 2_f64.sqrt()
+        };
         let variance = noise * noise;
         let scatter = (sum + PRIOR_FREEDOM * 2.0 * variance) / (freedom + PRIOR_FREEDOM);
         let misfit = (scatter - variance).max((MIN_MISFIT_RATIO * noise).powi(2)).sqrt();

@@ -314,7 +314,7 @@ catalogue! {
     /// declared masses.
     BodyMass "body-mass" { joint: usize = LoadedJoint } => Family {
         terms: &[TermEntry::at(At::Joint(JointField::BodyMass), "mass", 0.0).prior(Prior::BodyMass)],
-        says: "bodies of joint {joint} weigh more or less than declared",
+        says: "bodies of joint {joint} have another mass than declared",
         only: &[Only::Bodies],
         needs: &[Need::Loads, Need::GivesWay],
         ..Family::PLAIN
@@ -322,7 +322,7 @@ catalogue! {
     /// Error m of the payload's mass, in all poses with a payload.
     PayloadMass "payload-mass" => Family {
         terms: &[TermEntry::at(At::Arm(ArmField::Payload), "mass", 2.0)],
-        says: "payloads weigh more or less than declared",
+        says: "payloads have another mass than declared",
         needs: &[Need::Payload, Need::OtherLoads],
         ..Family::PLAIN
     };

@@ -87,6 +87,11 @@ impl CauseKind {
         (Self::Other, 0.01),
     ];
 
+    /// Returns true for a move of a base, a tool or a fixture.
+    pub(super) fn is_placement(self) -> bool {
+        matches!(self, Self::Base | Self::Fixture | Self::Tool)
+    }
+
     /// Returns the largest ratio of the errors to the assumed noise that is tried for the cause;
     /// `None` for a cause without such a ratio.
     pub(crate) fn largest_ratio(self) -> Option<f64> {
@@ -356,13 +361,10 @@ impl Extended {
     /// cause, because the rows cannot distinguish the two. With pixels alone, for example, a held
     /// base and a free board in the world are one unknown.
     fn merged_held_causes(&self, mut causes: Vec<Cause>, rows: &SensitiveRows) -> Vec<Cause> {
-        let is_placement = |cause: &Cause| {
-            matches!(cause.kind, CauseKind::Base | CauseKind::Fixture | CauseKind::Tool)
-        };
         let spaces: Vec<(usize, ColumnSpace)> = causes
             .iter()
             .enumerate()
-            .filter(|(_, cause)| is_placement(cause) && self.has_free_parameter(cause))
+            .filter(|(_, cause)| cause.kind.is_placement() && self.has_free_parameter(cause))
             .map(|(place, cause)| (place, ColumnSpace::new(rows, &cause.columns)))
             .collect();
         let mut merged: Vec<(usize, usize)> = Vec::new();

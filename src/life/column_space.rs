@@ -32,8 +32,13 @@ impl ColumnSpace {
     }
 
     /// Returns the part of a vector that is orthogonal to the space.
-    fn outside(&self, vector: &DVector<f64>) -> DVector<f64> {
+    pub fn outside(&self, vector: &DVector<f64>) -> DVector<f64> {
         vector - &self.basis * self.basis.tr_mul(vector)
+    }
+
+    /// Returns the parts of the columns of a matrix that are orthogonal to the space.
+    pub fn outside_of(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        matrix - &self.basis * self.basis.tr_mul(matrix)
     }
 
     /// Returns true if the columns lie in the space and at least one of them is not zero.

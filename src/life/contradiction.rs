@@ -91,7 +91,7 @@ impl Contradiction {
             }
             (true, None) => String::new(),
         };
-        let still = if index == 0 { "" } else { "with that, they still do; " };
+        let still = if index == 0 { "" } else { "besides the causes named before: " };
         let cause = if self.noise_ratio.is_some() {
             let what = if index == 0 { "them" } else { "the rest" };
             format!("{still}no change that was tried explains {what} as well as {}", self.label)

@@ -1,6 +1,6 @@
 //! Errors of an identification with a prior, of a fleet, and of a watch.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::error::InputError;
 use crate::fit::{IdentifyError, PredictError, SavedEstimateError};
@@ -69,8 +69,9 @@ pub enum PriorError {
     )]
     NoSigma { file: PathBuf },
     #[error(
-        "{}: shares {rows} fitted rows with {}; give one estimate of each arm",
-        file.display(), other.display()
+        "{}: {}; give one estimate of each arm",
+        file.display(),
+        shared(file, other, *rows)
     )]
     SameRows { file: PathBuf, other: PathBuf, rows: usize },
     #[error(
@@ -93,5 +94,14 @@ impl PriorError {
     /// Returns true if the work was stopped on request.
     pub(crate) fn is_interrupted(&self) -> bool {
         matches!(self, Self::Identify(error) if error.is_interrupted())
+    }
+}
+
+/// States that two estimates were fitted to the same rows, or that a file was given twice.
+fn shared(file: &Path, other: &Path, rows: usize) -> String {
+    if file == other {
+        "was given twice".to_owned()
+    } else {
+        format!("shares {rows} fitted rows with {}", other.display())
     }
 }

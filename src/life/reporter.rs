@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::assessment::AssessedCause;
 use super::causes::{Cause, CauseKind};
+use super::column_space::ColumnSpace;
 use super::earlier::WIDE_SIGMA;
 use super::evidence::{MIN_NAMED_PROBABILITY, Unchanged};
 use super::onset::{padded_factor, sums_of};
@@ -20,6 +21,10 @@ const MAX_OPERATIONS: f64 = 6e8;
 /// Smallest expected evidence per pose for one cause against another \[nats\] at which more poses
 /// can distinguish the causes.
 const MIN_NATS_PER_POSE: f64 = 1e-3;
+/// Largest part of a change that a placement does not imitate, as a share of the change and in units
+/// of the noise, at which rows do not distinguish the two.
+const MAX_OUTSIDE_SHARE: f64 = 0.01;
+const MAX_OUTSIDE_NOISE: f64 = 1.0;
 /// Smallest ratio of the error with the most probable cause to that of a table read in another way,
 /// at which the table is misread.
 const MIN_MARGIN: f64 = 1.5;
@@ -167,13 +172,16 @@ impl Reporter<'_> {
     }
 
     /// Returns the root mean square error of the rows of the leading kind that noise, the known
-    /// misfit and the uncertainty of the estimate without drift give \[m\] or \[rad\].
+    /// misfit and the uncertainty of the estimate without drift give \[m\] or \[rad\]. Bases and
+    /// targets that the estimate does not know are fitted to the rows, and take up what they can.
     pub fn expected_error(&self) -> f64 {
         let mut known = self.known_factor();
         // Effects of temperature that the estimate lacks are possible, but not expected.
         let of_warmth = self.causes.iter().filter(|cause| cause.kind == CauseKind::Temperature);
         of_warmth.flat_map(|cause| &cause.columns).for_each(|&k| known.row_mut(k).fill(0.0));
-        self.rms(|row| self.rows.expected_errors(row, &known))
+        let unknown = ColumnSpace::new(self.rows, self.unknown);
+        let of_estimate = unknown.outside_of(&(self.rows.columns(&known) * &known));
+        self.rms(|row| self.rows.expected_errors(row, &of_estimate))
     }
 
     /// Returns the root mean square error of the rows of the leading kind (positions, if there are
@@ -207,6 +215,29 @@ impl Reporter<'_> {
             let moved = rows.of_row(row).select_columns(&columns);
             rows.residual_of(row) - moved * &means[row % groups]
         }))
+    }
+
+    /// Returns the words for a base, tool or fixture that would move the measured points just as a
+    /// link or a zero does, by the most probable size of its change; `None` if rows distinguish the two.
+    pub fn placement_alike(&self, assessed: &AssessedCause) -> Option<String> {
+        let cause = &self.causes[assessed.cause];
+        if !matches!(cause.kind, CauseKind::Zero | CauseKind::Link) {
+            return None;
+        }
+        let columns = self.rows.sensitivity.select_columns(&cause.columns);
+        let moved = columns * &assessed.mean;
+        let is_alike = |placement: &&Cause| {
+            let (count, rows) = (placement.columns.len(), self.rows);
+            let space = ColumnSpace::new(rows, &placement.columns);
+            let outside = space.outside(&moved).norm();
+            rows.coordinates.iter().sum::<usize>() > count
+                && space.basis.ncols() == count
+                && outside <= MAX_OUTSIDE_NOISE
+                && outside <= MAX_OUTSIDE_SHARE * moved.norm()
+        };
+        let placement = self.causes.iter().filter(|of| of.kind.is_placement()).find(is_alike)?;
+        let instrument = if placement.kind == CauseKind::Base { " or the instrument" } else { "" };
+        Some(format!("or {}{instrument} moved alike", placement.label))
     }
 
     /// Returns the number of additional poses like these after which a cause is expected to be nine

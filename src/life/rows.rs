@@ -94,12 +94,11 @@ impl SensitiveRows {
     }
 
     /// Returns 1 σ of each measured coordinate of a row in units of its noise: noise, misfit, and the
-    /// uncertainty of an estimate with the covariance F Fᵀ, F = `factor`.
-    pub fn expected_errors(&self, row: usize, factor: &DMatrix<f64>) -> DVector<f64> {
-        let of_estimate = self.of_row(row).columns(0, factor.nrows()) * factor;
+    /// uncertainty of the estimate, which gives all residuals the covariance A Aᵀ, A = `of_estimate`.
+    pub fn expected_errors(&self, row: usize, of_estimate: &DMatrix<f64>) -> DVector<f64> {
         DVector::from_fn(self.coordinates[row], |coordinate, _| {
             let misfit = self.misfit_of(row, coordinate).map_or(0.0, |(_, sigma)| sigma);
-            of_estimate.row(coordinate).norm().hypot(misfit).hypot(1.0)
+            of_estimate.row(row * self.stride + coordinate).norm().hypot(misfit).hypot(1.0)
         })
     }
 

@@ -131,8 +131,8 @@ impl Measurements {
         (different.len() > 1 && looks_like_weights).then(|| self.warning(row, "payload_kg", kind))
     }
 
-    /// Returns a warning if the reference temperature is far beyond all temperatures, or beyond them
-    /// and among them if it is in degrees Fahrenheit.
+    /// Returns a warning if the reference temperature is far beyond all temperatures, or if it lies
+    /// outside them but would lie among them when converted from degrees Fahrenheit.
     pub(super) fn far_reference(&self, problem: &Problem) -> Option<Warning> {
         let reference = problem.data.reference_temperature?;
         let values = || self.temperature.iter().flatten().copied();

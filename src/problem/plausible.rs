@@ -201,6 +201,14 @@ impl Problem {
             is_of_joint || ["base", "tool"].iter().any(|owner| rule.pattern.starts_with(owner))
         });
         let overridden = |(place, rule): (usize, &ParameterRule)| {
+            // A rule for a joint that is not declared has no parameters at all.
+            let digits = |c: char| !c.is_ascii_digit();
+            let number =
+                rule.pattern.strip_prefix("joint").and_then(|rest| rest.split(digits).next());
+            let number = number.and_then(|number| number.parse::<usize>().ok());
+            if number.is_some_and(|number| number > self.joints.len()) {
+                return None;
+            }
             let mut later = rules().skip(place + 1).map(|(_, later)| later);
             let by = later.find(|later| matches(&later.pattern, &rule.pattern))?;
             Some(Warning {

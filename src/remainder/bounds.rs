@@ -144,6 +144,15 @@ impl Bounds {
         self
     }
 
+    /// Returns the bounds of some of the poses.
+    pub(crate) fn of_poses(&self, chosen: &[usize]) -> Self {
+        Self {
+            poses: chosen.iter().map(|&pose| self.poses[pose]).collect(),
+            lengths: chosen.iter().map(|&pose| self.lengths[pose]).collect(),
+            ..*self
+        }
+    }
+
     /// Compares the bounds with errors that were not fitted. `errors` has for each of them the
     /// index of its pose in these bounds, its row in `table`, and its length \[m\]. Rows of one
     /// configuration err alike, so they count once with their mean error.

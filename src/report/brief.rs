@@ -23,7 +23,7 @@ pub fn estimate_brief(
     accuracy: Option<PredictionAccuracy>,
 ) -> String {
     let mut blocks = estimate_head(problem, found, accuracy);
-    blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
+    blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(found, comparison))));
     blocks.push(Block::Lines(parameter_counts(found), remarks(found)));
     text(&blocks)
 }
@@ -113,7 +113,7 @@ fn farthest_for_its_prior(found: &Identification) -> Option<String> {
     };
     (sigmas > MIN_REMARKED_SIGMAS).then(|| {
         format!(
-            "farthest from nominal for its prior: {} by {} ({} σ of its estimate{shared})",
+            "farthest from nominal for its prior: {} by {} ({} times what the prior expects{shared})",
             estimate.name,
             shown(deviation),
             number(sigmas, 1)

@@ -64,7 +64,7 @@ pub fn check(problem: &Problem, check: &Check) -> Story {
     ]);
     // If held-out rows are predicted, the checked poses are the fitted ones of a table.
     let poses = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
-    blocks.extend(assumptions(problem, &forecast.expected, poses));
+    blocks.extend(assumptions(problem, &forecast.expected, (poses, 0)));
     blocks.extend(detection::blocks(problem, &check.detection));
     Story::new(&problem.title, "check", blocks)
 }

@@ -467,7 +467,7 @@ fn gain_sentences(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool)
 }
 
 /// States what structure remains in the residual and where it is shown; `None` if no residual test
-/// failed and no place is known.
+/// failed and no place is known, or if the warnings name a mistake of the input as the cause.
 fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let failed = residual_tests::failed(&closure.residual_tests);
     let places = if result.size_alone().is_none() { structure_places(result) } else { Vec::new() };
@@ -483,7 +483,7 @@ fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<Stri
         )),
     };
     let parts: Vec<String> = structure.into_iter().chain(tests).collect();
-    (!parts.is_empty())
+    (!parts.is_empty() && (result.trusted || !closure.after.names_mistake()))
         .then(|| format!("What remains: {}. Details: -v or report.html.", parts.join("; ")))
 }
 

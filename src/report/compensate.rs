@@ -37,8 +37,10 @@ pub fn commands_text(
     if let Some(bounds) = bounds.filter(|_| result.reached > 0) {
         // The text states no distance between target and corrected command, which only the solver
         // leaves: the expected error of the real arm is larger.
-        let misses: Vec<f64> = commands.iter().map(|command| command.seed_miss).collect();
-        let _ = write!(words, ".\n{}", bound_sentence(bounds, &misses, None));
+        let is_reached = |target: &usize| commands[*target].is_reached();
+        let reached: Vec<usize> = (0..commands.len()).filter(is_reached).collect();
+        let misses: Vec<f64> = reached.iter().map(|&target| commands[target].seed_miss).collect();
+        let _ = write!(words, ".\n{}", bound_sentence(&bounds.of_poses(&reached), &misses, None));
     } else if result.reached > 0 {
         words += ".\nThe expected error of the commands is not known, because the estimate states no uncertainty of positions.";
     }
@@ -260,10 +262,17 @@ fn common_offset(targets: &Measurements, commands: &[Command]) -> Option<String>
 }
 
 /// Returns a warning if the joint columns lead so far from the targets that they do not tell which
-/// of the configurations that reach a target is meant.
+/// of the configurations that reach a target is meant, or if such targets are out of reach.
 fn far_starts(targets: &Measurements, commands: &[Command]) -> Option<String> {
     let is_far = |command: &&Command| command.seed_miss > MIN_FAR_START;
-    let far: Vec<&Command> = commands.iter().filter(is_far).collect();
+    let (mut far, missed): (Vec<&Command>, Vec<&Command>) =
+        commands.iter().filter(is_far).partition(|command| command.is_reached());
+    let so = if far.is_empty() {
+        far = missed;
+        ", and out of reach"
+    } else {
+        ", so that their commands may be of another configuration of the arm than is meant"
+    };
     let is_warned = targets.position_measured && mean_miss(commands) > MIN_FAR_START;
     let first = targets.location(far.first().filter(|_| is_warned)?.row);
     let what = if 2 * far.len() > commands.len() {
@@ -272,8 +281,8 @@ fn far_starts(targets: &Measurements, commands: &[Command]) -> Option<String> {
         format!("the positions and joint angles of these targets, the first at {first},")
     };
     Some(format!(
-        "{} of {} targets are {} mm or more from where their joint columns lead, so that their commands \
-         may be of another configuration of the arm than is meant: check {what} before the arm is moved",
+        "{} of {} targets are {} mm or more from where their joint columns lead{so}: check {what} before \
+         the arm is moved",
         far.len(),
         commands.len(),
         MIN_FAR_START * 1e3

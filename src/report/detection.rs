@@ -56,7 +56,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
         blocks.push(Block::Table(Table::new(&header, rows, &[0, 4, 5]).noted(&[COLUMNS_NOTE])));
     }
     if !if_timed.is_empty() {
-        let list = effect::listed(if_timed).join("; ");
+        let list = effect::listed(if_timed, true).join("; ");
         blocks.push(Block::Text(format!(
             "These effects can be seen only if the table records {} (the figures assume about one \
              minute between poses): {list}.",
@@ -80,7 +80,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     let acts_by_load = |effect: &&Detectable| effect.effect.has_need(&[Need::Loads]);
     if has_no_mass(problem) && hidden.iter().any(acts_by_load) {
         let loaded = hidden.iter().filter(|effect| acts_by_load(effect));
-        let list = effect::listed(loaded.map(|effect| &effect.effect)).join("; ");
+        let list = effect::listed(loaded.map(|effect| &effect.effect), true).join("; ");
         blocks.push(Block::Text(format!(
             "Not visible, because no mass is declared, so no load acts: {list}. Give the links {} \
              and {} in {}.",
@@ -91,7 +91,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
         hidden.retain(|effect| !acts_by_load(effect));
     }
     if !hidden.is_empty() {
-        let list = effect::listed(hidden.into_iter().map(|effect| &effect.effect)).join("; ");
+        let list = effect::listed(hidden.into_iter().map(|effect| &effect.effect), true).join("; ");
         blocks.push(Block::Text(format!(
             "Not visible with these poses, even at the size of their prior: {list}."
         )));
@@ -101,7 +101,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
         untestable.filter(|(of, _)| effect::is_at_moving_joint(problem, of)).cloned().collect();
     if !untestable.is_empty() {
         blocks.push(Block::heading("Not visible with measurements of this kind"));
-        blocks.push(Block::List(effect::reasons(untestable)));
+        blocks.push(Block::List(effect::reasons(untestable, true)));
     }
     blocks
 }

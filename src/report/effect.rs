@@ -133,17 +133,24 @@ pub(super) fn is_at_moving_joint(problem: &Problem, effect: &Effect) -> bool {
 }
 
 /// Groups effects by family and reason. Returns a list item for each group: the effects, then the
-/// reason.
-pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) -> Vec<Point> {
-    grouped(effects)
+/// reason. Unless times were measured, row numbers stand for them.
+pub(super) fn reasons<'a>(
+    effects: impl IntoIterator<Item = (Effect, &'a str)>,
+    time_measured: bool,
+) -> Vec<Point> {
+    grouped(effects, time_measured)
         .into_iter()
         .map(|(words, why)| Point::from(format!("{words}: {why}")))
         .collect()
 }
 
-/// Groups effects by family, and describes each group in one text.
-pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<String> {
-    grouped(effects.into_iter().map(|effect| (effect.clone(), ())))
+/// Groups effects by family, and describes each group in one text. Unless times were measured, row
+/// numbers stand for them.
+pub(super) fn listed<'a>(
+    effects: impl IntoIterator<Item = &'a Effect>,
+    time_measured: bool,
+) -> Vec<String> {
+    grouped(effects.into_iter().map(|effect| (effect.clone(), ())), time_measured)
         .into_iter()
         .map(|(words, ())| words)
         .collect()
@@ -152,6 +159,7 @@ pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<S
 /// Groups effects by family and reason, and describes each group: "`backlash` at joints 1, 2, 3".
 fn grouped<R: Copy + PartialEq>(
     effects: impl IntoIterator<Item = (Effect, R)>,
+    time_measured: bool,
 ) -> Vec<(String, R)> {
     let mut groups: Vec<(Vec<Effect>, R)> = Vec::new();
     for (effect, reason) in joined(effects) {
@@ -165,7 +173,9 @@ fn grouped<R: Copy + PartialEq>(
             None => groups.push((vec![effect], reason)),
         }
     }
-    groups.into_iter().map(|(members, reason)| (describe_group(&members), reason)).collect()
+    let described =
+        |(members, reason): (Vec<Effect>, R)| (describe_group(&members, time_measured), reason);
+    groups.into_iter().map(described).collect()
 }
 
 /// Describes effects of one family that differ in time constants or distances by their places
@@ -212,16 +222,18 @@ fn describe_couplings(members: &[Effect]) -> String {
 }
 
 /// Describes effects of one family: name, places, and orders or numbers of trial values.
-fn describe_group(members: &[Effect]) -> String {
+fn describe_group(members: &[Effect], time_measured: bool) -> String {
     let name = members[0].name();
+    let (times, constants) =
+        if time_measured { ("times", "") } else { ("rows", ", counted in rows") };
     match (members[0].searched_value(), members.len()) {
         (Some((ArgumentKind::Time, _)), 2..) => {
-            return format!("{} at {} times", code(name), members.len());
+            return format!("{} at {} {times}", code(name), members.len());
         }
         (_, 2..) if members[0].has_memory() => return describe_places(members),
         _ if members[0].other_joint().is_some() => return describe_couplings(members),
         (Some((ArgumentKind::Duration, _)), 2..) => {
-            return format!("{} of {} time constants", code(name), members.len());
+            return format!("{} of {} time constants{constants}", code(name), members.len());
         }
         _ => {}
     }
@@ -268,8 +280,9 @@ pub(super) fn seen_ranges(ranges: &[(impl Display, (f64, f64))]) -> Option<Strin
     };
     let ranges: Vec<String> = ranges.iter().map(range).collect();
     let joined = ranges.join(", ");
+    let radians = if joined.contains('q') { ", angles in rad" } else { "" };
     let celsius = if joined.contains("temperature") { ", temperature in °C" } else { "" };
-    (!ranges.is_empty()).then(|| format!("{joined} (SI units{celsius})"))
+    (!ranges.is_empty()).then(|| format!("{joined} (SI units{radians}{celsius})"))
 }
 
 #[cfg(test)]
@@ -298,7 +311,7 @@ mod tests {
             (1..=60).map(move |order| Effect::JointHarmonic { joint, orders: vec![order] })
         });
         let others = [Effect::Backlash { joint: 3 }, Effect::JointCoupling { joint: 2, from: 1 }];
-        let lines = grouped(harmonics.chain(others).map(|effect| (effect, ())));
+        let lines = grouped(harmonics.chain(others).map(|effect| (effect, ())), true);
         let words: Vec<String> = lines.into_iter().map(|(words, ())| words).collect();
         let expected = [
             format!("{} of joints 1, 2, orders 1–60", code("joint-harmonic")),
@@ -306,6 +319,11 @@ mod tests {
             format!("{} of joint 2 by joint 1", code("joint-coupling")),
         ];
         assert_eq!(words, expected);
+        let shifts = [9.5, 19.5].map(|at_time| Effect::StationShift { at_time });
+        for (time_measured, noun) in [(true, "times"), (false, "rows")] {
+            let expected = format!("{} at 2 {noun}", code("station-shift"));
+            assert_eq!(listed(&shifts, time_measured), [expected]);
+        }
         assert_eq!(ranges(&[1, 3, 4, 5, 6, 8, 9, 11, 12, 13]), "1, 3–6, 8, 9, 11–13");
     }
 }

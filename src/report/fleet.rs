@@ -88,19 +88,21 @@ fn draw_parameters(fleet: &Fleet) -> Option<Drawing> {
 }
 
 fn parameter(parameter: &FleetParameter) -> Vec<String> {
-    let (factor, symbol) = match parameter.unit.as_str() {
-        "rad" => (1f64.to_degrees(), "°"),
-        "m" => (1e3, "mm"),
-        "N·m/rad" | "N" | "N·m²" => (100.0, "%"),
-        other => (1.0, other),
+    let FleetParameter { mean, mean_error, spread, declared, .. } = *parameter;
+    // Deviations of stiffnesses are logarithms of the ratio to the nominal value.
+    let (mean, ratio, factor, symbol) = match parameter.unit.as_str() {
+        "rad" => (mean, 1.0, 1f64.to_degrees(), "°"),
+        "m" => (mean, 1.0, 1e3, "mm"),
+        "N·m/rad" | "N" | "N·m²" => (mean.exp_m1(), mean.exp(), 100.0, "%"),
+        other => (mean, 1.0, 1.0, other),
     };
     let show = |value: f64| two_digits(value * factor, MAX_DECIMALS);
     vec![
         format!("{} [{symbol}]", parameter.name),
-        number(parameter.mean * factor, decimals(parameter.mean_error * factor, MAX_DECIMALS)),
-        show(parameter.mean_error),
-        show(parameter.spread),
-        or_dash(parameter.declared, show),
+        number(mean * factor, decimals(ratio * mean_error * factor, MAX_DECIMALS)),
+        show(ratio * mean_error),
+        show(ratio * spread),
+        or_dash(declared, show),
     ]
 }
 
@@ -117,4 +119,23 @@ fn arm(arm: &FleetArm, is_judged: bool) -> Vec<String> {
         or_dash(most, |most| most.0.clone()),
         or_dash(most, |most| number(most.1, 1)),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_of_a_stiffness_is_shown_as_a_ratio_to_nominal() {
+        let fleet = FleetParameter {
+            name: "joint2.stiffness".to_owned(),
+            unit: "N·m/rad".to_owned(),
+            nominal: 9e3,
+            mean: -0.088,
+            mean_error: 0.02,
+            spread: 0.05,
+            declared: Some(0.3),
+        };
+        assert_eq!(parameter(&fleet), ["joint2.stiffness [%]", "-8.4", "1.8", "4.6", "30"]);
+    }
 }

@@ -38,11 +38,12 @@ pub(super) fn undetermined_note(expected: &[ExpectedParameter]) -> Option<&'stat
 }
 
 /// States the assumptions of a forecast: that all of `fitted` poses are fitted, and that the target
-/// is at its default place. `None` if neither needs saying.
+/// is at its default place. `at_hand` is the number of poses that are measured already. `None` if
+/// neither needs saying.
 pub(super) fn assumptions<'a>(
     problem: &Problem,
     expected: &[ExpectedParameter],
-    fitted: Option<usize>,
+    (fitted, at_hand): (Option<usize>, usize),
 ) -> Option<Block<'a>> {
     let mut points = Vec::new();
     if let Some(HeldOut::Fraction { fraction, .. }) = &problem.data.held_out
@@ -50,9 +51,13 @@ pub(super) fn assumptions<'a>(
         && let Some(measured) = poses_to_measure(problem, fitted)
     {
         let share = 100.0 * fraction;
+        let further = match at_hand {
+            0 => format!("{measured} poses"),
+            _ => format!("{} further poses", measured.saturating_sub(at_hand)),
+        };
         points.push(format!(
-            "All {} are fitted. held_out in [data] removes {} % of the measured poses from the fit: measure {measured} poses to fit as \
-             many.",
+            "All {} are fitted. held_out in [data] removes {} % of the measured poses from the fit: \
+             measure {further} to fit as many.",
             counted(fitted, "pose"),
             number(share, 1).trim_end_matches(".0"),
         ));

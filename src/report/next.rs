@@ -78,7 +78,9 @@ fn error_paragraph(next: &NextPoses, percent: &str) -> String {
                     mm(attainable_bound(&error), 3)
                 ))
                 .unwrap_or_default(),
-            if next.found.noise == Noise::Declared {
+            if next.found.noise == Noise::Declared && next.assumes_more_than_attainable() {
+                "To be on the safe side, the choice allows for more:"
+            } else if next.found.noise == Noise::Declared {
                 "The choice allows for"
             } else {
                 "No σ is declared, so the choice assumes"

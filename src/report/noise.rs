@@ -22,6 +22,9 @@ const MAX_EQUAL_VARIANCE_RATIO: f64 = 1.0 + 1e-9;
 /// Smallest ratio of the rms error of held-out rows to that of fitted rows which is said where no
 /// error bound says it.
 const UNCERTAIN_RATIO: f64 = 3.0;
+/// Largest χ²/ν that noise alone gives in 99.9 % of cases, up to which a χ²/ν within the interval
+/// shows that the model explains the data.
+const MAX_TELLING_CHANCE: f64 = 1.8;
 /// First word on a fit without errors that something contradicts beyond chance.
 const CONVERGED: &str = "Converged";
 /// Name of the file that contains all outliers and influential rows.
@@ -64,10 +67,16 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
                     "the {kept:.0} rows that the robust loss keeps scatter as the declared σ says; \
                      {aside} of {of:.0} rows are set aside"
                 )
+            } else if found.chance.is_some_and(|(_, high)| high > MAX_TELLING_CHANCE) {
+                "so few measurements do not contradict the declared σ".to_owned()
             } else {
                 "the model explains the data to the declared σ".to_owned()
             };
-            format!("Reduced χ² (χ²/ν) is {}: {explained}.", number(chi2, 2))
+            let holds = |(low, high): &(f64, f64)| (*low..=*high).contains(&chi2);
+            let within = found.chance.filter(holds).map_or_else(String::new, |(low, high)| {
+                format!(", within {} to {} (99.9 %)", number(low, 2), number(high, 2))
+            });
+            format!("Reduced χ² (χ²/ν) is {}{within}: {explained}.", number(chi2, 2))
         }
         ResidualSize::Unclear(chi2) => {
             let (size, what, are) = if chi2 > 1.0 {
@@ -136,6 +145,11 @@ pub(super) fn expected_interval(found: &Identification) -> String {
 /// States the σ that the fit assumed because residuals and priors contradict the declared one, and
 /// the probable cause.
 fn other_sigma(problem: &Problem, found: &Identification) -> String {
+    if found.names_mistake() {
+        return "Standard errors mean nothing before the mistake that the warnings name is \
+                corrected."
+            .to_owned();
+    }
     let errors = &found.fitted.identification;
     let sigma = problem.data.position_sigma.filter(|_| errors.kind == "position");
     let declared = sigma.map_or_else(String::new, |sigma| {
@@ -153,9 +167,6 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
         _ if !is_larger && found.reduced_chi2.is_some_and(|chi2| chi2 > 1.0) => {
             "but χ² is too large: some rows, or one kind of rows, fit badly; -v lists them"
                 .to_owned()
-        }
-        _ if found.names_mistake() => {
-            "as a consequence of the mistake that the warnings name".to_owned()
         }
         _ if is_larger && found.has(FindingCode::PriorContradicted) => {
             "because of the prior whose σ the data refute".to_owned()

@@ -55,8 +55,13 @@ pub fn plan(
 ) -> Story {
     let planned = &plan.planned;
     let (poses, given) = (plan.poses.len(), plan.given);
-    let besides =
-        if given > 0 { format!(" besides {given} that are measured") } else { String::new() };
+    let besides = match plan.held_out {
+        0 if given == 0 => String::new(),
+        0 => format!(" besides {given} that are measured"),
+        held_out => format!(
+            " besides {given} measured ones that are fitted ({held_out} others are held out)"
+        ),
+    };
     let rows = planned.expected.iter().enumerate().map(|(k, expected)| {
         let random = plan.random_error(k);
         let (mut row, unit) = cells(expected, &[expected.prior, random, expected.std_error]);
@@ -109,7 +114,8 @@ pub fn plan(
     blocks.push(unidentifiable(&planned.identifiability, &names, ("plan.json", None)));
     // Rows of a camera's table are points, not poses.
     let fitted = (!plan.is_of_cameras || given == 0).then_some(poses + given);
-    blocks.extend(assumptions(problem, &planned.expected, fitted));
+    let at_hand = given + plan.held_out;
+    blocks.extend(assumptions(problem, &planned.expected, (fitted, at_hand)));
     blocks.extend(separated.map(separation_blocks).unwrap_or_default());
     blocks.push(Block::Page(vec![
         Block::heading("The planned poses"),

@@ -15,12 +15,12 @@ use crate::remainder::{Bounds, Compared};
 
 /// Returns the predictions, with a figure of the errors of measured rows. `arm` describes the arm
 /// that was used, and `fitted` lists the predicted rows (from 0, ascending) to which that arm was
-/// fitted.
+/// fitted. `lacks_loads` is true if the table lacks a column of loads that these rows had.
 pub(crate) fn prediction(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
-    (compared, fitted): (Option<Compared>, &[usize]),
+    (compared, fitted, lacks_loads): (Option<Compared>, &[usize], bool),
 ) -> Story {
     let count = prediction.positions.len();
     let single_kind = prediction.errors.as_ref().filter(|errors| errors.kinds.is_empty());
@@ -34,7 +34,9 @@ pub(crate) fn prediction(
         let _ = write!(words, "; {lost} of them have no equilibrium");
     }
     let mut blocks = opening(&problem.title, words).to_vec();
-    let contradiction = compared.filter(|_| fitted.is_empty()).and_then(contradiction);
+    let contradiction = compared
+        .filter(|_| fitted.is_empty())
+        .and_then(|compared| contradiction(compared, lacks_loads));
     blocks.extend(contradiction.clone().map(Block::Text));
     if !prediction.placed.is_empty() {
         let names = prediction.placed.join(", ");

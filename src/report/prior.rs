@@ -29,7 +29,7 @@ pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
     let table = Table { notes: vec![note], ..Table::new(&HEADER, rows, &[0]) };
     vec![
         Block::Heading("Prior against the new rows".to_owned()),
-        Block::Text(summary(comparison)),
+        Block::Text(summary(found, comparison)),
         Block::figures([draw(comparison)]),
         Block::Table(table),
     ]
@@ -59,8 +59,9 @@ fn draw(comparison: &PriorComparison) -> Option<Drawing> {
     .drawing()
 }
 
-/// States whether the new rows agree with the earlier estimate.
-pub(super) fn summary(comparison: &PriorComparison) -> String {
+/// States whether the new rows agree with the earlier estimate. This test knows no bounds and no
+/// constraints, which the text says if the fit is at one.
+pub(super) fn summary(found: &Identification, comparison: &PriorComparison) -> String {
     let mut text = format!("Prior: {}", comparison.file.display());
     if comparison.days > 0.0 {
         let plural = if comparison.days > 1.0 { "s" } else { "" };
@@ -70,10 +71,13 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
         let rows = counted(comparison.left_out, "row");
         let _ = write!(text, "; {rows} that it was fitted to left out");
     }
+    let is_limited = !found.active_constraints.is_empty()
+        || found.estimates.iter().any(|estimate| estimate.at_bound.is_some());
+    let limits = if is_limited { " (without bounds and constraints)" } else { "" };
     if let Some((chi2, coordinates, p)) = comparison.chi2 {
         let _ = write!(
             text,
-            ". New rows against it: χ² = {} with {coordinates:.0} degrees of freedom, p {}",
+            ". New rows against it{limits}: χ² = {} with {coordinates:.0} degrees of freedom, p {}",
             number(chi2, 1),
             p_value(p)
         );

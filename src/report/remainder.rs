@@ -369,14 +369,23 @@ pub(super) fn bound_sentence(
 }
 
 /// States that rows contradict an estimate that was fitted to none of them: their error, the
-/// expected one, and how many lie within their bounds; `None` if they do not.
-pub(super) fn contradiction(compared: Compared) -> Option<String> {
+/// expected one, and how many lie within their bounds; `None` if they do not. `lacks_loads` is true if
+/// the table lacks a column of loads that the rows of the estimate had.
+pub(super) fn contradiction(compared: Compared, lacks_loads: bool) -> Option<String> {
     let test = compared.test.filter(|test| test.is_contradicted())?;
     let squares = compared.errors.iter().map(|(_, length)| length * length);
     let rms = (squares.sum::<f64>() / compared.errors.len() as f64).sqrt();
+    let are_outside = compared.bounds.poses.iter().all(|pose| pose.is_extrapolated);
+    let before = if lacks_loads {
+        "The table lacks loads, as the warning says; or this"
+    } else if are_outside {
+        "These rows lie outside the range of the fitted poses, where errors may be larger; or this"
+    } else {
+        "This"
+    };
     Some(format!(
         "The rows contradict the estimate: {} mm rms, {} mm expected, {} of {} configurations \
-         within their bounds. This arm has changed, it is another one, or the table is \
+         within their bounds. {before} arm has changed, it is another one, or the table is \
          misread (units, signs).",
         number(rms * 1e3, 3),
         number(compared.bounds.expected() * 1e3, 3),

@@ -27,7 +27,7 @@ pub(super) fn other_reduced_chi2(
     let reasons = [
         (fit.orientation.is_some(), "take positions alone"),
         (!tests.outliers.is_empty(), "leave out outliers"),
-        (is_elastic, "fit each stiffness by itself"),
+        (is_elastic, "also free the stiffnesses that the fit keeps equal"),
     ];
     let reasons: Vec<&str> =
         reasons.iter().filter(|(holds, _)| *holds).map(|(_, reason)| *reason).collect();

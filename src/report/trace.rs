@@ -283,7 +283,7 @@ pub(super) fn ranking<'a>(
         return vec![
             Block::heading("Candidate effects"),
             Block::Text(format!(
-                "None of {tried} candidates is significant. The best one, {}, is not clearly \
+                "None of {tried} candidates is significant. The best one ({}) is not clearly \
                  better than noise (p {}, corrected for the number of candidates; significant \
                  below {level}).",
                 declared(&first.effect),
@@ -397,7 +397,7 @@ pub(super) fn undetectable_effects<'a>(problem: &Problem, trace: &Trace) -> Vec<
     let mut blocks = Vec::new();
     if !untestable.is_empty() {
         blocks.push(Block::heading("Effects that these data cannot show"));
-        blocks.push(Block::List(effect::reasons(untestable)));
+        blocks.push(Block::List(effect::reasons(untestable, trace.time_measured)));
     }
     // Where a direction of approach is recorded, play moves the arm without loads and is testable.
     let (unloaded, absorbed): (Vec<&Effect>, Vec<&Effect>) = absorbed
@@ -408,14 +408,14 @@ pub(super) fn undetectable_effects<'a>(problem: &Problem, trace: &Trace) -> Vec<
             "Effects that these data cannot show, because no mass is declared, so that no load \
              acts",
         ));
-        blocks.push(Block::list(effect::listed(unloaded)));
+        blocks.push(Block::list(effect::listed(unloaded, trace.time_measured)));
     }
     if !absorbed.is_empty() {
         blocks.push(Block::heading(
             "Effects that these poses cannot show, because fitted parameters make up for them \
              exactly",
         ));
-        blocks.push(Block::list(effect::listed(absorbed)));
+        blocks.push(Block::list(effect::listed(absorbed, trace.time_measured)));
     }
     blocks
 }

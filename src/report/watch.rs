@@ -8,10 +8,10 @@ use super::render::Story;
 use crate::life::{CauseKind, Change, MIN_EXPECTED_P, Watch, WatchedCause};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
-use crate::quantity::Unit;
 use crate::quantity::format::{
     MAX_DECIMALS, counted, decimals, number, or_dash, p_value, two_digits,
 };
+use crate::quantity::{Display, Unit};
 
 /// Header of the table of causes.
 const HEADER: [&str; 5] = ["cause", "probability", "change ± 1 σ", "error left out", "more poses"];
@@ -85,8 +85,14 @@ pub(crate) fn watch(
             "probability: among all causes that were tried, given that something changed",
             left.as_str(),
             "more poses: number of further poses like these that would distinguish this cause \
-             from the next one; –: none would",
+             from the next one; – there: none would, or there is no other cause",
         ];
+        let changes = || watch.causes.iter().flat_map(|cause| &cause.changes);
+        let rough = (!changes().all(is_nearly_linear)).then_some(
+            "roughly: the errors are not linear in so large a change; a fit to the rows alone tells \
+             its size",
+        );
+        let notes: Vec<&str> = notes.into_iter().chain(rough).collect();
         blocks.push(Block::Table(Table::new(&HEADER, rows, &[0, 2]).noted(&notes)));
     }
     Story::new(&problem.title, "watch", blocks)
@@ -233,20 +239,35 @@ fn lines(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<Vec<Stri
     std::iter::once(line).chain(others.iter().map(other)).collect()
 }
 
+/// Largest change of the logarithm of a stiffness that is stated with a standard error. Rows are
+/// predicted as linear in this logarithm, which is wrong by a tenth of the change at this size.
+const MAX_LINEAR_CHANGE: f64 = 0.2;
+
+/// Returns false if a stiffness changes by so much that its size and its standard error are not known
+/// well.
+fn is_nearly_linear(change: &Change) -> bool {
+    !change.unit.is_relative() || change.change.abs() <= MAX_LINEAR_CHANGE
+}
+
 /// Formats a change with its standard error; the name is the part of the parameter's name after the
 /// last dot, or the whole name where two causes changed. A turn has no standard error. Neither has a
 /// ratio of the noise: it is the best of some trial values, the largest one if `is_largest`.
 fn change(kind: CauseKind, change: &Change, is_largest: bool) -> String {
-    let (factor, symbol) = if change.unit.is_relative() {
-        (100.0, "%".to_owned())
-    } else {
-        let unit = change.unit.display(change.change);
-        (unit.factor, unit.symbol)
-    };
+    let Display { factor, symbol } = change.unit.display(change.change);
     let name = match kind {
         CauseKind::Two => &change.parameter,
         _ => change.parameter.rsplit('.').next().unwrap_or_default(),
     };
+    if change.unit.is_relative() {
+        let ratio = change.change.exp();
+        let percent = 100.0 * (ratio - 1.0);
+        if !is_nearly_linear(change) {
+            return format!("{name} roughly {} %", number(percent, 0));
+        }
+        let error = 100.0 * ratio * change.std_error;
+        let digits = decimals(error, MAX_DECIMALS);
+        return format!("{name} {} ± {} %", number(percent, digits), number(error, digits));
+    }
     if !change.std_error.is_finite() && change.unit != Unit::Number {
         return format!("{name} {} {symbol}", number(change.change * factor, 2));
     }
@@ -261,4 +282,21 @@ fn change(kind: CauseKind, change: &Change, is_largest: bool) -> String {
     let digits = decimals(change.std_error * factor, MAX_DECIMALS);
     let show = |value: f64| number(value * factor, digits);
     format!("{name} {} ± {} {symbol}", show(change.change), show(change.std_error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stiffness_changes_by_the_exponential_of_its_logarithm() {
+        let words = |change_of_ln| {
+            let parameter = "joint2.stiffness".to_owned();
+            let unit = Unit::TorsionalStiffness;
+            let changed = Change { parameter, unit, change: change_of_ln, std_error: 0.002 };
+            change(CauseKind::Stiffness, &changed, false)
+        };
+        assert_eq!(words(-0.1), "stiffness -9.52 ± 0.18 %");
+        assert_eq!(words(-0.7404), "stiffness roughly -52 %");
+    }
 }

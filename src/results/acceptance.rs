@@ -241,8 +241,8 @@ fn protocol(problem: &Problem, judged: &Acceptance) -> String {
     let chosen = match &problem.data.held_out {
         Some(HeldOut::Fraction { fraction, seed }) => {
             format!(
-                "a random part of {} % of the configurations (seed {seed})",
-                number(100.0 * fraction, 1)
+                "a random part of at least {} % of the configurations (seed {seed})",
+                number(100.0 * fraction, 1).trim_end_matches(".0")
             )
         }
         Some(HeldOut::Session(name)) => {

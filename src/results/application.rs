@@ -131,10 +131,14 @@ impl CompensationResult {
         }
     }
 
-    /// Returns the result with the expected error at the targets and with its bounds.
+    /// Returns the result with the expected error at the targets that are reached, and with its
+    /// bounds, which `bounds` contains for all targets.
     #[must_use]
     pub fn with_bounds(self, bounds: &Bounds) -> Self {
-        Self { bounds: Some(BoundSummary::new(bounds)), ..self }
+        let is_reached = |target: &usize| !self.unreached.contains(&(target + 1));
+        let reached: Vec<usize> = (0..bounds.poses.len()).filter(is_reached).collect();
+        let of_reached = || BoundSummary::new(&bounds.of_poses(&reached));
+        Self { bounds: (!reached.is_empty()).then(of_reached), ..self }
     }
 }
 

@@ -87,8 +87,8 @@ fn other_branch(chain: &Chain, joints: &[usize]) -> Option<String> {
 fn moving_end(chain: &Chain) -> Option<String> {
     let (joint, tip) = (chain.moving_end()?, chain.ends().1);
     Some(format!(
-        "no fixed joint follows the moving joint {joint}, so that this URDF has no origin that could hold a rotation of the tool \
-         frame; add a fixed joint after {tip}, and choose its link with --tip"
+        "no fixed joint follows the moving joint {joint}, so that a URDF that export corrects can hold no rotation of the tool \
+         frame; for that, add a fixed joint after {tip}, and choose its link with --tip"
     ))
 }
 

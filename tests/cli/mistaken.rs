@@ -80,6 +80,34 @@ fn targets_that_contradict_their_joint_columns_are_asked_about() {
 }
 
 #[test]
+fn bounds_of_commands_are_those_of_the_targets_that_are_reached() {
+    let folder = identified();
+    let table = folder.table("measurements.csv");
+    let names = ["q1_deg", "q2_deg", "q3_deg", "q4_deg", "x_mm", "y_mm", "z_mm"];
+    let columns = names.map(|name| table.numbers(name));
+    let targets = |rows: &[(usize, f64)]| {
+        let rows = rows.iter().map(|&(row, factor)| {
+            let factor_of = |k: usize| if k < 4 { 1.0 } else { factor };
+            let cell = |(k, column): (usize, &Vec<f64>)| (column[row] * factor_of(k)).to_string();
+            columns.iter().enumerate().map(cell).collect::<Vec<_>>().join(",") + "\n"
+        });
+        folder.write("targets.csv", format!("{}\n{}", names.join(","), rows.collect::<String>()));
+        let command = "compensate . --estimate est/estimate.json --data targets.csv --out out";
+        (folder.flexcal(&format!("{command} --json")), folder.flexcal(command))
+    };
+    let three = [(0, 1.0), (1, 1.0), (2, 1.0)];
+    let (reached, _) = targets(&three);
+    let (some, told) = targets(&[&three[..], &[(3, 9.0), (4, 9.0)]].concat());
+    let (reached, some) = (reached.success().json(), some.code(1).json());
+    assert_eq!(some["unreached"], serde_json::json!([4, 5]));
+    for key in ["mean_bound_mm", "expected_error_mm"] {
+        assert!(reached[key].is_number() && reached[key] == some[key], "{key}: {some}");
+    }
+    assert!(!told.stdout.contains("outside the range"), "{told:?}");
+    assert!(!told.message().contains("another configuration"), "{told:?}");
+}
+
+#[test]
 fn a_pool_of_measured_poses_and_a_tolerance_in_metres_are_asked_about() {
     let folder = identified();
     // With few fitted poses, the held-out ones in the pool are wanted.

@@ -77,6 +77,23 @@ fn a_plan_can_be_checked_and_measured() {
     assert!((0.8..1.5).contains(&ratio), "{ratio}");
 }
 
+#[test]
+fn measured_poses_that_are_held_out_do_not_count() {
+    let (folder, table) = with_table("some.csv", &drawn(40));
+    let plan = format!("plan tests/cases --poses 3 --criterion d --candidates {table}");
+    let with = format!("{plan} --data tests/cases/a-none.csv --json");
+    let result = flexcal(&folder, &with).success().json();
+    assert_eq!((&result["poses"], &result["given"]), (&json!(3), &json!(28)));
+    // The forecast is that of the fitted rows alone.
+    let rows = std::fs::read_to_string(path("tests/cases/a-none.csv")).unwrap();
+    let is_fitted = |line: &&str| !line.contains("validation");
+    let fitted: String = rows.lines().filter(is_fitted).map(|line| format!("{line}\n")).collect();
+    folder.write("fitted.csv", fitted);
+    let file = folder.path("fitted.csv");
+    let alone = flexcal(&folder, &format!("{plan} --data {} --json", file.display())).json();
+    assert_eq!(result["parameters"], alone["parameters"]);
+}
+
 /// Returns a table of candidates within the ranges of the test rig.
 fn drawn(count: usize) -> String {
     let (problem, truth) = super::bench::lunar();

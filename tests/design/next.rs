@@ -90,6 +90,23 @@ fn poses_come_from_the_pool_and_lower_the_error() {
 }
 
 #[test]
+fn noise_is_the_declared_one_if_the_earlier_fit_assumed_more() {
+    let folder = measured(40);
+    let table = folder.read("arm/measurements.csv");
+    let lines: Vec<&str> = table.split_inclusive('\n').collect();
+    folder.write("first.csv", lines[..31].concat());
+    folder.write("new.csv", [&lines[..1], &lines[31..]].concat().concat());
+    folder.write(
+        "arm/problem.toml",
+        PROBLEM.replace("position_sigma_mm = 0.03", "position_sigma_mm = 0.015"),
+    );
+    folder.flexcal("identify arm --data first.csv --out first");
+    assert!(number(&folder.json("first/estimate.json")["sigma_taken_mm"]) > 0.02);
+    let prior = "--data new.csv --prior first/estimate.json --poses 1";
+    assert!((number(&next(&folder, prior).json()["noise_mm"]) - 0.015).abs() < 1e-9);
+}
+
+#[test]
 fn it_says_when_there_are_enough() {
     let folder = measured(40);
     let wide = next(&folder, "--tolerance-mm 1").success().json();

@@ -258,6 +258,31 @@ fn a_misread_table_is_not_judged_but_a_change_of_its_last_rows_is() {
     assert!(last.0 != CauseKind::Misread, "{last:?}");
 }
 
+#[test]
+fn a_zero_that_moves_the_points_as_the_base_would_names_both() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 2);
+    let label = |joint| {
+        let rows = bench.measure(&with_zero(&arm, joint, 0.05), 12, 4002, 1.0);
+        judged(&bench, &estimate, &rows).causes[0].label.clone()
+    };
+    assert_eq!(label(1), "zero of joint 1 (or base or the instrument moved alike)");
+    assert_eq!(label(3), "zero of joint 3");
+}
+
+#[test]
+fn a_base_that_the_estimate_does_not_know_adds_nothing_to_the_expected_error() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 2);
+    let rows = bench.measure(&arm, 20, 4020, 1.0);
+    let known = judged(&bench, &estimate, &rows).expected_error;
+    let mut moved = rows.clone();
+    moved.session = std::iter::repeat_n("later", rows.len()).collect();
+    let verdict = judged(&bench, &estimate, &moved);
+    assert!(!verdict.is_changed(), "{verdict:?}");
+    assert!((0.5..1.2).contains(&(verdict.expected_error / known)), "{known}: {verdict:?}");
+}
+
 /// Returns the rows of all tables, in their order.
 fn joined(tables: &[Measurements]) -> Measurements {
     let rows = || tables.iter().flat_map(|table| (0..table.len()).map(move |row| (table, row)));

@@ -160,7 +160,7 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
             "the sign of its numbers is lost, none of which is negative".to_owned()
         }
         Some(Relation::ReversedFrom(row)) => {
-            format!("about from {} on it counts the other way", rows.location(row))
+            format!("from about {} on, the column counts the other way", rows.location(row))
         }
         Some(Relation::Reversed) => "some of its numbers have the other sign".to_owned(),
         Some(Relation::HalfTurns) => {
@@ -172,8 +172,8 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
         "the positions do not follow the column {name}: with the coordinate of joint {} found from each \
          position, the nominal arm misses them by {} instead of {}; {what}",
         joint + 1,
-        format_error("position", after, 3),
-        format_error("position", before, 1)
+        format_error("position", after, 1),
+        format_error("position", fit.registered.identification.rms.norm, 1)
     );
     Some(finding(&[name], before, Some(after), text))
 }

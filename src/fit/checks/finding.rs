@@ -331,9 +331,16 @@ impl Finding {
     }
 
     /// Replaces a remedy that suggests `flexcal loop` by one that applies after a loop; other
-    /// remedies stay.
-    pub(crate) fn set_remedy_after_loop(&mut self) {
+    /// remedies stay. `has_onset` is true if the loop found an effect that begins at a time.
+    pub(crate) fn set_remedy_after_loop(&mut self, has_onset: bool) {
         let remedy = match self.code {
+            FindingCode::HeldOutOutliers if has_onset => {
+                self.remedy = "the change that was found may begin earlier or later, between the \
+                               fitted rows beside its time: correct the time; otherwise numbers or \
+                               signs are mistyped there"
+                    .to_owned();
+                return;
+            }
             FindingCode::HeldOutBeyondPrediction => {
                 "measure poses like the held-out ones and fit them too"
             }

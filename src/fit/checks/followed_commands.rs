@@ -49,7 +49,7 @@ pub(super) enum Relation {
     ReversedFrom(usize),
     /// Some coordinates have the other sign.
     Reversed,
-    /// Some coordinates differ by half a turn.
+    /// The found joint angle differs from the column by half a turn in some rows.
     HalfTurns,
 }
 

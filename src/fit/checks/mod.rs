@@ -231,11 +231,10 @@ fn state_limits_first(findings: &mut [Finding]) {
         let readings: Vec<String> = readings.map(str::to_owned).collect();
         let text = format!(
             "limits of the problem cause most of the misfit (another warning lists them): without \
-             limits {errors}; or the input is misread, which leaves no less: {}",
+             them {errors}; a misreading would explain as much: {}",
             first_of(&readings)
         );
-        let remedy = "check these limits first, then units, signs, order or convention in the \
-                      table or the problem";
+        let remedy = "check the limits first";
         let stated = Finding { text, ..findings[misread].clone() };
         findings[misread] = stated.with_remedy(remedy.to_owned());
     }

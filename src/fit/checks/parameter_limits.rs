@@ -106,8 +106,8 @@ fn fitted_deviation(fit: &CheckedFit, parameter: &Parameter) -> Option<f64> {
     fitted.find(|(other, _)| std::ptr::eq(*other, parameter)).map(|(_, x)| *x)
 }
 
-/// States the declared and the fitted value of a parameter: " (declared 200.00 mm, fitted 310.2
-/// mm)".
+/// States the nominal and the fitted value of a parameter and σ of its prior: " (nominal 200.0 mm,
+/// fitted 310.2 mm, σ 10.0 mm)".
 fn values_in_words(parameter: &Parameter, x: f64) -> String {
     let unit = parameter.unit().display(parameter.nominal);
     let digits = decimals((x * unit.factor).abs(), 4);
@@ -115,7 +115,10 @@ fn values_in_words(parameter: &Parameter, x: f64) -> String {
     if parameter.unit().is_relative() {
         return format!(" (fitted: {} times the declared value)", two_digits(x.exp(), 4));
     }
-    format!(" (declared {}, fitted {})", show(parameter.nominal), show(parameter.value(x)))
+    let sigma = parameter.sigma.map_or_else(String::new, |sigma| {
+        format!(", σ {} {}", two_digits(sigma * unit.factor, 4), unit.symbol)
+    });
+    format!(" (nominal {}, fitted {}{sigma})", show(parameter.nominal), show(parameter.value(x)))
 }
 
 /// Returns the ratio of the fitted value of a parameter to its nominal one.
