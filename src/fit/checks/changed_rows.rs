@@ -39,6 +39,11 @@ const MAX_SIZE: [usize; 2] = [4000, 150];
 /// Smallest probability of a residual as large as that of two arms, by noise alone. A larger
 /// residual shows that the model lacks something, which two arms approximate better than one.
 const MIN_NOISE_PROBABILITY: f64 = 1e-3;
+/// Largest number of rows that a text lists.
+const MAX_LISTED: usize = 4;
+/// Largest share of the changed rows on the wrong side of a limit of a column that tells them from the
+/// others.
+const MAX_MIXED_SHARE: f64 = 0.1;
 /// Number of random orders of the rows.
 const RANDOM_ORDERS: usize = 19;
 /// Seed of the random orders.
@@ -119,22 +124,120 @@ fn changed(fit: &CheckedFit, images: bool) -> Option<Finding> {
     let of_arm = (!images).then(|| linear.best_of_arm_refined(&order)).flatten();
     let of_arm = of_arm.filter(|step| is_noise(&linear, step));
     let step = linear.better(of_place, of_arm)?;
-    let freedom = freedom_of(&linear, &step);
+    if is_shown(fit, (&linear, &places), (&order, &groups), &step) {
+        return finding(fit, &linear, &places, &[of_order(fit, &order, step)]);
+    }
+    if images {
+        return None;
+    }
+    places.remove(&Place::Arm);
+    two_changes(fit, (&linear, &places), (&order, &groups))
+        .or_else(|| mixed_targets(fit, &linear, &places))
+}
+
+/// Returns true if a change explains most of the misfit, if chance does not explain that, and if only
+/// the order of the table shows it.
+fn is_shown(
+    fit: &CheckedFit,
+    (linear, places): (&Linear, &Places),
+    (order, groups): (&[usize], &[Vec<usize>]),
+    step: &Step,
+) -> bool {
+    let tries = (places.len() * order.len()) as f64;
+    is_beyond_chance(linear, step, tries)
+        && !is_explained_otherwise(fit, (linear, places), (order, groups), step)
+}
+
+/// Returns true if a change that was chosen from `tries` explains most of the misfit, and if chance
+/// does not explain that.
+fn is_beyond_chance(linear: &Linear, step: &Step, tries: f64) -> bool {
+    let freedom = freedom_of(linear, step);
     let noise = freedom.min(linear.cost);
     let explained = (linear.cost - step.cost) / (linear.cost - noise).max(f64::MIN_POSITIVE);
-    if explained < MIN_EXPLAINED {
-        return None;
-    }
     let ratio = (linear.cost - step.cost) / step.columns as f64 / (step.cost / freedom);
-    let chance = FisherSnedecor::new(step.columns as f64, freedom).ok()?.sf(ratio);
-    let tries = (places.len() * rows.len()) as f64;
-    if chance * tries > MAX_CHANCE_PROBABILITY {
+    let chance = FisherSnedecor::new(step.columns as f64, freedom).map(|of| of.sf(ratio));
+    explained >= MIN_EXPLAINED
+        && chance.is_ok_and(|chance| chance * tries <= MAX_CHANCE_PROBABILITY)
+}
+
+/// Returns the finding on two places that change, or one that changes twice, each from a row on; `None`
+/// if one of the two changes is not shown beside the other.
+fn two_changes(
+    fit: &CheckedFit,
+    (linear, places): (&Linear, &Places),
+    (order, groups): (&[usize], &[Vec<usize>]),
+) -> Option<Finding> {
+    let beside = |step: &Step| linear.with_change(&places[&step.place], &order[step.first..]);
+    let may_begin = begins(groups);
+    let best = |of: &Linear| of.best_of_places(places, order, &may_begin);
+    let second = best(&beside(&best(linear)?)?)?;
+    let first = best(&beside(&second)?)?;
+    let second = best(&beside(&first)?)?;
+    let mut steps = [first, second];
+    let are_shown = (0..2).all(|k| {
+        let beside = beside(&steps[1 - k]);
+        beside.is_some_and(|of| is_shown(fit, (&of, places), (order, groups), &steps[k]))
+    });
+    if !are_shown {
         return None;
     }
-    if is_explained_otherwise(fit, (&linear, &places), (&order, &groups), &step) {
-        return None;
-    }
-    Some(finding(fit, &linear, &places, &order, &step))
+    steps.sort_by_key(|step| step.first);
+    finding(fit, linear, places, &steps.map(|step| of_order(fit, order, step)))
+}
+
+/// Returns a change with the words for its rows, from a row of the order on, and the first of them.
+fn of_order(fit: &CheckedFit, order: &[usize], step: Step) -> (String, String, Step) {
+    let row = fit.fitting.split.identification[order[step.first]];
+    let location = fit.fitting.measurements.location(row).to_string();
+    let rows = format!("from {location} on ({} of {} rows)", order.len() - step.first, order.len());
+    (rows, location, step)
+}
+
+/// Returns the finding on rows in which a target sits elsewhere, in any order; `None` if these rows
+/// are not told apart clearly.
+fn mixed_targets(fit: &CheckedFit, linear: &Linear, places: &Places) -> Option<Finding> {
+    let is_target = |place: &Place| matches!(place, Place::Target(_));
+    places.iter().filter(|(place, _)| is_target(place)).find_map(|(&place, columns)| {
+        let (rows, change, cost) = linear.two_values(columns)?;
+        let step = Step { place, first: 0, cost, change, columns: columns.len() };
+        // Chance chooses from all divisions of the rows.
+        let tries = 2_f64.powi(i32::try_from(fit.fitting.split.identification.len()).ok()?);
+        if !is_beyond_chance(linear, &step, tries) || is_told_by_column(fit, &rows) {
+            return None;
+        }
+        let identification = &fit.fitting.split.identification;
+        let location = |&row: &usize| fit.fitting.measurements.location(identification[row]);
+        let shown: Vec<String> =
+            rows.iter().take(MAX_LISTED).map(|row| location(row).to_string()).collect();
+        let more = rows.len().saturating_sub(MAX_LISTED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let place = format!(
+            "in {}{more} ({} of {} rows)",
+            shown.join(", "),
+            rows.len(),
+            identification.len()
+        );
+        finding(fit, linear, places, &[(place, shown[0].clone(), step)])
+    })
+}
+
+/// Returns true if a column of the table tells nearly all of these rows from the others by a limit of
+/// its values.
+fn is_told_by_column(fit: &CheckedFit, rows: &[usize]) -> bool {
+    let count = fit.fitting.split.identification.len();
+    let order: Vec<usize> = (0..count).collect();
+    let tells = |values: Vec<f64>| {
+        let mut sorted = order.clone();
+        sorted.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+        // The number of rows on the side that each limit gives them, of either sense.
+        let mut right = rows.len();
+        sorted.iter().any(|row| {
+            right = if rows.contains(row) { right - 1 } else { right + 1 };
+            let least = right.min(count - right) as f64;
+            least <= MAX_MIXED_SHARE * rows.len() as f64
+        })
+    };
+    other_columns(fit, &order).into_iter().any(tells)
 }
 
 /// Returns the rows of an order in groups between which a change may begin: each image, or each row
@@ -248,19 +351,49 @@ fn is_explained_otherwise(
         || (0..RANDOM_ORDERS).into_par_iter().any(is_by_chance)
 }
 
-/// Returns the finding on a change that explains most of the misfit.
+/// Returns the finding on changes that explain most of the misfit together, each with the words for its
+/// rows and its first row.
 fn finding(
     fit: &CheckedFit,
     linear: &Linear,
     places: &Places,
-    order: &[usize],
-    step: &Step,
-) -> Finding {
-    let table = fit.fitting.measurements;
-    let row = fit.fitting.split.identification[order[step.first]];
-    let location = table.location(row).to_string();
+    changes: &[(String, String, Step)],
+) -> Option<Finding> {
+    let (_, location, first) = changes.first()?;
+    let (mut texts, mut remedies) = (Vec::new(), Vec::new());
+    for (rows, _, step) in changes {
+        let (what, remedy) = described(fit, &places[&step.place], step);
+        texts.push(format!("{rows} {what}"));
+        if !remedies.contains(&remedy) {
+            remedies.push(remedy);
+        }
+    }
+    let (cost, columns) = changes.iter().fold((f64::INFINITY, 0), |(cost, columns), of| {
+        (cost.min(of.2.cost), columns + of.2.columns)
+    });
+    let freedom = (linear.freedom - columns as f64).max(1.0);
+    let before = (linear.cost / linear.freedom).sqrt();
+    let after = (cost / freedom).sqrt();
+    let change = if changes.len() > 1 { "these changes" } else { "this change" };
+    let text = format!(
+        "{}: {change} would leave, as linearised, a residual of {after:.1} times the declared σ \
+         instead of {before:.1}",
+        texts.join("; ")
+    );
+    let name = match first.place {
+        Place::Target(_) => "target",
+        Place::Base(_) => "base",
+        Place::Fixture(_) => "fixture",
+        Place::Zero(_) => "zero",
+        Place::Arm => "arm",
+    };
+    let numbers = [json!(location), json!(name), before.into(), after.into()];
+    Some(Finding::new(FindingCode::RowsChanged, numbers, text).with_remedy(remedies.join("; ")))
+}
+
+/// Describes the change of a place, with the remedy for it.
+fn described(fit: &CheckedFit, columns: &[usize], step: &Step) -> (String, String) {
     let parameters: Vec<&Parameter> = fit.whole.parameters().collect();
-    let columns = &places[&step.place];
     let length = |from: usize| {
         let squares = columns.iter().zip(step.change.iter()).filter(|(column, _)| match parameters
             [**column]
@@ -273,7 +406,7 @@ fn finding(
         });
         squares.map(|(_, change)| change * change).sum::<f64>().sqrt()
     };
-    let (what, remedy) = match step.place {
+    match step.place {
         Place::Target(_) => (
             format!("the target sits {:.1} mm elsewhere in its frame", 1e3 * length(0)),
             "if the reflector was put into another nest, or the tool was changed, give these \
@@ -322,22 +455,5 @@ fn finding(
              are of one arm with one set-up, and fit them by themselves"
                 .to_owned(),
         ),
-    };
-    let before = (linear.cost / linear.freedom).sqrt();
-    let after = (step.cost / freedom_of(linear, step)).sqrt();
-    let text = format!(
-        "from {location} on ({} of {} rows) {what}: this change would leave, as linearised, a \
-         residual of {after:.1} times the declared σ instead of {before:.1}",
-        order.len() - step.first,
-        order.len()
-    );
-    let name = match step.place {
-        Place::Target(_) => "target",
-        Place::Base(_) => "base",
-        Place::Fixture(_) => "fixture",
-        Place::Zero(_) => "zero",
-        Place::Arm => "arm",
-    };
-    let numbers = [json!(location), json!(name), before.into(), after.into()];
-    Finding::new(FindingCode::RowsChanged, numbers, text).with_remedy(remedy)
+    }
 }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::followed_commands::{Relation, Unrelated, unrelated};
+use super::followed_commands::{Neighbour, Relation, Unrelated, unrelated};
 use super::misfit::Misfit;
 use super::row_kind::format_error;
 use super::row_relation::{OtherRows, other_rows};
@@ -167,6 +167,20 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
             "some of its numbers are half a turn off, as angles that were wrapped to 180°"
                 .to_owned()
         }
+        Some(Relation::OfNeighbour(Neighbour::Before)) => {
+            "each of its numbers belongs to the row before".to_owned()
+        }
+        Some(Relation::OfNeighbour(Neighbour::After)) => {
+            "each of its numbers belongs to the row after".to_owned()
+        }
+        Some(Relation::Held(run)) => {
+            format!("it holds one number {}, as a log that froze", in_rows(rows, run))
+        }
+        Some(Relation::Offset(run, by)) => {
+            let size = if by > 0.0 { "small" } else { "large" };
+            let by = by.abs().to_degrees();
+            format!("{} its numbers are too {size} by {by:.0}°", in_rows(rows, run))
+        }
     };
     let text = format!(
         "the positions do not follow the column {name}: with the coordinate of joint {} found from each \
@@ -176,6 +190,11 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
         format_error("position", fit.registered.identification.rms.norm, 1)
     );
     Some(finding(&[name], before, Some(after), text))
+}
+
+/// Returns the words for rows from the first to the last.
+fn in_rows(rows: &Measurements, [first, last]: [usize; 2]) -> String {
+    format!("in the rows from {} to {}", rows.location(first), rows.location(last))
 }
 
 /// Returns true if values rise, or fall, from the first to the last.

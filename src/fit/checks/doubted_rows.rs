@@ -6,14 +6,11 @@ use nalgebra::{DVector, Vector3};
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
-use super::doubted_columns::{column_name, moving};
 use super::finding::{Finding, FindingCode};
 use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, Misfit};
+use super::mistaken_rows::{MistakenRows, of_rows};
 use super::row_kind::format_error;
-use crate::fit::stages::fitting::Fitting;
-use crate::measurement::{Measurements, Split};
-use crate::model::Pose;
-use crate::problem::JointKind;
+use crate::measurement::Split;
 
 /// Number of successive rows of each base to which the nominal arm is registered in a trial. They
 /// determine base and tool.
@@ -29,18 +26,6 @@ const MAX_OF_RMS: f64 = 2.5;
 const MIN_SHARE: f64 = 0.6;
 /// Number of registrations to the rows that fit the one before.
 const PASSES: usize = 3;
-/// Units of a length that a table may confuse: factors of the measured numbers, with their words.
-const LENGTH_FACTORS: [(f64, &str); 6] = [
-    (1e3, "multiply them by 1000"),
-    (1e-3, "divide them by 1000"),
-    (10.0, "multiply them by 10"),
-    (0.1, "divide them by 10"),
-    (25.4, "multiply them by 25.4"),
-    (1.0 / 25.4, "divide them by 25.4"),
-];
-
-/// Names of the coordinates of a position.
-const NAMES: [&str; 3] = ["x", "y", "z"];
 
 /// Checks, if the fit is far off, that most rows do not fit the nominal arm without the others.
 pub(super) struct RowsBelongTogether;
@@ -101,39 +86,10 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     }
     let measurements = fit.fitting.measurements;
     let place = |place: usize| measurements.location(rows[place]).to_string();
-    let pairs = apart.iter().map(|&place| {
-        let measured = measurements.positions[rows[place]];
-        (measured, measured - trial.errors[place])
-    });
-    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = pairs.collect();
-    let is_run = last + 1 - first == apart.len() && apart.len() >= WINDOW;
     let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
-    let stands_elsewhere = || {
-        let rms = registration_error(fit, measurements, &chosen).filter(|_| is_run)?;
-        (rms < limit).then(|| {
-            "they fit by themselves where base or target stand elsewhere: if the instrument, the base or \
-             the target was moved, give them another word in the column session"
-                .to_owned()
-        })
-    };
-    let in_other_unit = || {
-        let fits = |&(factor, _): &(f64, &str)| {
-            let mut converted = measurements.clone();
-            for &row in &chosen {
-                converted.positions[row] *= factor;
-            }
-            registration_error(fit, &converted, &chosen).is_some_and(|rms| rms < limit)
-        };
-        let mut factors = LENGTH_FACTORS.into_iter().filter(|_| chosen.len() >= WINDOW);
-        factors.find(fits).map(|(_, words)| format!("their positions are in another unit: {words}"))
-    };
     let kept: Vec<usize> = trial.near.iter().map(|&place| rows[place]).collect();
-    let cause = other_session(fit, &trial.x, &chosen, limit)
-        .or_else(|| mistake(&pairs, limit))
-        .or_else(|| other_joint_angles(fit, &trial.x, &chosen, limit))
-        .or_else(|| mistaken_joints(fit, &trial.x, &chosen, limit))
-        .or_else(stands_elsewhere)
-        .or_else(in_other_unit)
+    let cause = MistakenRows { fit, x: &trial.x, rows: &chosen, limit }
+        .cause()
         .or_else(|| of_other_target(fit, &chosen, &kept).filter(|_| !are_few));
     if cause.is_none() && are_few {
         return None;
@@ -165,79 +121,7 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
 /// Registers the nominal arm to the `chosen` identification rows alone.
 fn registration(fit: &CheckedFit, chosen: Vec<usize>) -> Option<DVector<f64>> {
     let split = Split { identification: chosen, held_out: Vec::new() };
-    registered(fit, fit.fitting.measurements, &split, |fitting| fitting.registered().ok())
-}
-
-/// Returns the rms error of the nominal arm after its registration to the `chosen` rows of
-/// `measurements` alone \[m\].
-fn registration_error(
-    fit: &CheckedFit,
-    measurements: &Measurements,
-    chosen: &[usize],
-) -> Option<f64> {
-    let split = Split { identification: chosen.to_vec(), held_out: Vec::new() };
-    registered(fit, measurements, &split, |fitting| {
-        let x = fitting.registered().ok()?;
-        Some(fit.rms(chosen, &fitting.position_errors(chosen, &x)))
-    })
-}
-
-/// Calls `evaluate` with the fit of the identification rows of `split` alone.
-fn registered<R>(
-    fit: &CheckedFit,
-    measurements: &Measurements,
-    split: &Split,
-    evaluate: impl FnOnce(&Fitting) -> R,
-) -> R {
-    let Fitting { placement, model, .. } = *fit.fitting;
-    let held_out_only = placement.held_out_only(model, measurements, split);
-    let declared = fit.fitting.with_declared_noise();
-    let fitting = Fitting { split, measurements, turn_sigma: None, held_out_only, ..declared };
-    evaluate(&fitting)
-}
-
-/// Returns the words for positions of the `chosen` rows that belong to the joint angles of other
-/// rows of the table, to `limit` \[m\] with the registered arm `x`. A shift leaves a row without a
-/// position.
-fn other_joint_angles(
-    fit: &CheckedFit,
-    x: &DVector<f64>,
-    chosen: &[usize],
-    limit: f64,
-) -> Option<String> {
-    let table = fit.fitting.measurements;
-    let is_position = |row: &usize| table.observation(*row).is_position();
-    let every_row: Vec<usize> = (0..table.len()).filter(is_position).collect();
-    let errors = fit.fitting.position_errors(&every_row, x);
-    let predicted: Vec<(usize, Vector3<f64>)> = every_row
-        .iter()
-        .zip(errors)
-        .map(|(&row, error)| (row, table.positions[row] - error))
-        .collect();
-    let base_of = |row: usize| fit.fitting.placement.base_of(row);
-    let source = |row: &usize| {
-        let distance = |of: &&(usize, Vector3<f64>)| (of.1 - table.positions[*row]).norm();
-        let of_base = predicted.iter().filter(|of| base_of(of.0) == base_of(*row));
-        let nearest = of_base.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        (nearest.0 != *row && distance(&nearest) < limit).then_some((*row, nearest.0))
-    };
-    let sources: Vec<(usize, usize)> = chosen.iter().filter_map(source).collect();
-    if sources.len() < chosen.len().saturating_sub(1).max(2) {
-        return None;
-    }
-    let are_shifted =
-        |by: isize| sources.iter().all(|&(row, of)| row.checked_add_signed(by) == Some(of));
-    let are_exchanged = || {
-        let others: BTreeSet<usize> = sources.iter().map(|&(_, of)| of).collect();
-        others.len() == sources.len() && others.iter().all(|of| chosen.contains(of))
-    };
-    if are_shifted(-1) {
-        Some("their positions belong to the joint angles of the row before".to_owned())
-    } else if are_shifted(1) {
-        Some("their positions belong to the joint angles of the row after".to_owned())
-    } else {
-        are_exchanged().then(|| "their positions belong to each other's joint angles".to_owned())
-    }
+    of_rows(fit, fit.fitting.measurements, &split, |fitting| fitting.registered().ok())
 }
 
 /// Returns the words for `chosen` rows that are those of other targets than all rows that are
@@ -286,120 +170,4 @@ fn windows(fit: &CheckedFit, rows: &[usize]) -> Vec<Vec<usize>> {
     };
     let by_target = (0..targets).map(of_target).filter(|places| places.len() >= WINDOW);
     (0..trials).map(window).chain(by_target).collect()
-}
-
-/// Returns the words for `chosen` rows that fit the bases of other sessions to `limit` \[m\], with
-/// the registered arm `x`.
-fn other_session(
-    fit: &CheckedFit,
-    x: &DVector<f64>,
-    chosen: &[usize],
-    limit: f64,
-) -> Option<String> {
-    let Fitting { placement, model, .. } = *fit.fitting;
-    let poses = fit.fitting.poses(chosen);
-    let mut sessions = BTreeSet::new();
-    for pose in &poses {
-        let others = (0..placement.bases.len()).filter(|base| *base != pose.base);
-        let moved: Vec<Pose> = others
-            .map(|base| {
-                // Without a column target each session has its target.
-                let has_target =
-                    placement.targets.get(pose.target) == placement.bases.get(pose.base);
-                let target = placement.bases.get(base).filter(|_| has_target);
-                let target =
-                    target.and_then(|word| placement.targets.iter().position(|of| of == word));
-                Pose { base, target: target.unwrap_or(pose.target), ..*pose }
-            })
-            .collect();
-        let errors = model.residuals(moved.clone(), x);
-        let place = errors.iter().position(|error| error.norm() < limit)?;
-        sessions.insert(placement.bases[moved[place].base].as_str());
-    }
-    let sessions: Vec<&str> = sessions.into_iter().collect();
-    Some(format!(
-        "they fit in session {} instead: correct the column session",
-        sessions.join(" or ")
-    ))
-}
-
-/// Returns the words for a mistake in the joint columns that explains the positions of the `chosen`
-/// rows to `limit` \[m\], with the registered arm `x`: angles in another unit, or the sign of a
-/// joint.
-fn mistaken_joints(
-    fit: &CheckedFit,
-    x: &DVector<f64>,
-    chosen: &[usize],
-    limit: f64,
-) -> Option<String> {
-    let table = fit.fitting.measurements;
-    let joints: Vec<usize> = moving(fit).collect();
-    let is_turning =
-        |joint: &usize| fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
-    let turning: Vec<usize> = joints.iter().copied().filter(is_turning).collect();
-    let fits = |changed: &[usize], factor: f64| {
-        let mut corrected = table.clone();
-        for &row in chosen {
-            for &joint in changed {
-                corrected.configurations[row * table.joints + joint] *= factor;
-            }
-        }
-        let fitting = Fitting { measurements: &corrected, ..fit.fitting.with_declared_noise() };
-        fit.rms(chosen, &fitting.position_errors(chosen, x)) < limit
-    };
-    let in_degrees = 1_f64.to_radians();
-    if fits(&turning, in_degrees.recip()) {
-        return Some("their joint angles are in radians, unlike those of the others".to_owned());
-    }
-    if fits(&turning, in_degrees) {
-        return Some("their joint angles are in degrees, unlike those of the others".to_owned());
-    }
-    let joint = joints.into_iter().find(|&joint| fits(&[joint], -1.0))?;
-    Some(format!("their {} has the other sign", column_name(table, joint)))
-}
-
-/// Function of a measured and a predicted position that returns the corrected measurement.
-type Correction<'a> = dyn Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + 'a;
-
-/// Returns the words for a mistake that explains pairs of measured and predicted positions to
-/// `limit` \[m\].
-fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String> {
-    let fits = |corrected: &Correction| {
-        let square = |(measured, predicted): &(Vector3<f64>, Vector3<f64>)| {
-            (corrected(measured, predicted) - predicted).norm_squared()
-        };
-        (pairs.iter().map(square).sum::<f64>() / pairs.len() as f64).sqrt() < limit
-    };
-    let sign = (0..3).find(|&axis| {
-        fits(&|measured, _| {
-            let mut corrected = *measured;
-            corrected[axis] = -corrected[axis];
-            corrected
-        })
-    });
-    if let Some(axis) = sign {
-        return Some(format!("their {} has the other sign", NAMES[axis]));
-    }
-    let exchanged = [(0, 1), (0, 2), (1, 2)].into_iter().find(|&(first, second)| {
-        fits(&|measured, _| {
-            let mut corrected = *measured;
-            corrected.swap_rows(first, second);
-            corrected
-        })
-    });
-    if let Some((first, second)) = exchanged {
-        return Some(format!("their {} and {} are exchanged", NAMES[first], NAMES[second]));
-    }
-    let mut factors = LENGTH_FACTORS.into_iter();
-    if let Some((_, words)) = factors.find(|(factor, _)| fits(&|measured, _| measured * *factor)) {
-        return Some(format!("their positions are in another unit: {words}"));
-    }
-    let axis = (0..3).find(|&axis| {
-        fits(&|measured, predicted| {
-            let mut corrected = *measured;
-            corrected[axis] = predicted[axis];
-            corrected
-        })
-    });
-    axis.map(|axis| format!("their {} alone is wrong", NAMES[axis]))
 }

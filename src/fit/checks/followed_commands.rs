@@ -51,6 +51,19 @@ pub(super) enum Relation {
     Reversed,
     /// The found joint angle differs from the column by half a turn in some rows.
     HalfTurns,
+    /// Each number belongs to the row before, or to the row after.
+    OfNeighbour(Neighbour),
+    /// The column holds one number in these rows, unlike the joint.
+    Held([usize; 2]),
+    /// Coordinates in these rows are larger by this angle \[rad\].
+    Offset([usize; 2], f64),
+}
+
+/// Row beside another one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Neighbour {
+    Before,
+    After,
 }
 
 /// Largest difference of a found coordinate from one that the column explains \[rad\].
@@ -60,14 +73,25 @@ const MIN_RELATED_SHARE: f64 = 0.9;
 /// Smallest share of the rows in which a relation changes the coordinate.
 const MIN_CHANGED_SHARE: f64 = 0.1;
 
-/// Returns the relation of the coordinates of a turning joint that were `found` in some rows to their
-/// commands. Each row is given with its command and the found coordinate \[rad\].
-fn relation(found: &[(usize, f64, f64)]) -> Option<Relation> {
-    let is_near = |difference: f64| {
-        let turns = (difference / TAU).round();
-        (difference - turns * TAU).abs() < MAX_DIFFERENCE
-    };
+/// Minimum number of rows in which a column holds one number.
+const MIN_HELD: usize = 4;
+
+/// Returns the relation of the coordinates of a turning joint that were `found` in some rows to the
+/// numbers of its `column` in all rows \[rad\]. Each row is given with its number and the found
+/// coordinate.
+fn relation(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
+    let wrapped = |difference: f64| difference - (difference / TAU).round() * TAU;
+    let is_near = |difference: f64| wrapped(difference).abs() < MAX_DIFFERENCE;
     let count = found.len() as f64;
+    for (neighbour, by) in [(Neighbour::Before, 1), (Neighbour::After, -1)] {
+        let number = |row: usize| column.get(row.checked_add_signed(by)?);
+        let follows = |&&(row, _, coordinate): &&(usize, f64, f64)| {
+            number(row).is_some_and(|number| is_near(coordinate - number))
+        };
+        if found.iter().filter(follows).count() as f64 >= MIN_RELATED_SHARE * count {
+            return Some(Relation::OfNeighbour(neighbour));
+        }
+    }
     let is_same = |&(_, command, coordinate): &(usize, f64, f64)| is_near(coordinate - command);
     let explains = |is_changed: &dyn Fn(&(usize, f64, f64)) -> bool| {
         let changed: Vec<usize> = found
@@ -90,8 +114,29 @@ fn relation(found: &[(usize, f64, f64)]) -> Option<Relation> {
         let is_run = reversed.contains(&last) && kept.count() == 0;
         return Some(if is_run { Relation::ReversedFrom(first) } else { Relation::Reversed });
     }
-    explains(&|(_, command, coordinate)| is_near(coordinate - command + PI))
-        .map(|_| Relation::HalfTurns)
+    // The longest run of equal numbers, in which the coordinates are others.
+    let runs = column.chunk_by(|one, next| one.total_cmp(next).is_eq()).map(<[f64]>::len);
+    let runs = runs.scan(0, |first, length| {
+        *first += length;
+        Some(*first - length..*first)
+    });
+    let longest = runs.max_by_key(ExactSizeIterator::len).filter(|run| run.len() >= MIN_HELD);
+    if let Some(run) = longest
+        && explains(&|(row, ..)| run.contains(row)).is_some()
+    {
+        return Some(Relation::Held([run.start, run.end - 1]));
+    }
+    // Each row that differs proposes the angle by which all of them do.
+    let changed = || found.iter().filter(|of| !is_same(of));
+    let offset = changed()
+        .map(|of| wrapped(of.2 - of.1))
+        .max_by_key(|angle| changed().filter(|of| is_near(of.2 - of.1 - angle)).count())?;
+    let rows = explains(&|(_, command, coordinate)| is_near(coordinate - command - offset))?;
+    let (&first, &last) = (rows.first()?, rows.last()?);
+    if !found.iter().any(|of| (first..=last).contains(&of.0) && is_same(of)) {
+        return Some(Relation::Offset([first, last], offset));
+    }
+    is_near(offset - PI).then_some(Relation::HalfTurns)
 }
 
 /// Returns the only joint whose column does not hold its coordinate, if the positions fit with that
@@ -116,11 +161,12 @@ pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Opti
     let is_alone = errors.get(1).is_none_or(|next| after < MAX_RATIO_TO_OTHERS * next.1);
     let command = |row: usize| fit.fitting.measurements.configuration(row)[joint];
     let pairs = rows.iter().zip(found).map(|(&row, &coordinate)| (row, command(row), coordinate));
+    let column: Vec<f64> = (0..fit.fitting.measurements.len()).map(command).collect();
     let is_turning = fit.problem.joints[joint].command_kind() == JointKind::Revolute;
     (after < limit && is_alone).then(|| Unrelated {
         joint,
         after,
-        relation: relation(&pairs.collect::<Vec<_>>()).filter(|_| is_turning),
+        relation: relation(&pairs.collect::<Vec<_>>(), &column).filter(|_| is_turning),
     })
 }
 

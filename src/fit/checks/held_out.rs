@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD};
+use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD, Misfit};
+use super::mistaken_rows::MistakenRows;
 use super::outliers::{Outlier, outliers_as_json};
 use super::row_kind::{RowKind, format_error, row_noun};
 use crate::fit::Identification;
@@ -24,6 +25,11 @@ const MIN_ERROR_RATIO: f64 = 1.5;
 /// Smallest rms held-out error, as a multiple of the noise that the fit assumed, at which the fit
 /// is reported as worse than the nominal arm.
 const MIN_NOISE_MULTIPLE: f64 = 5.0;
+
+/// Largest ratio of the rms error of held-out rows with a mistake corrected to that without, and to
+/// that of the fitted rows, at which the mistake is named.
+const MAX_MISTAKEN_RATIO: f64 = 0.2;
+const MAX_RATIO_TO_FITTED: f64 = 4.0;
 
 /// Returns all held-out rows, in their order, each with its length s · scatter as the distance
 /// ([`outliers`]).
@@ -192,10 +198,11 @@ impl Check for HeldOutReached {
         let of_kind = |row_kind: RowKind| {
             let RowKind { observation, spread, declared_sigma, .. } = row_kind;
             let kind = observation.kind();
-            let rows = fitting.split.held_out.iter().zip(&errors);
-            let lengths = rows
-                .filter(|(row, _)| fitting.measurements.observation(**row).kind() == kind)
-                .map(|(_, error)| error.norm());
+            let is_of_kind = |row: usize| fitting.measurements.observation(row).kind() == kind;
+            let held_out = fitting.split.held_out.iter().copied().zip(&errors);
+            let (rows, errors): (Vec<usize>, Vec<Vector3<f64>>) =
+                held_out.filter(|(row, _)| is_of_kind(*row)).unzip();
+            let lengths = errors.iter().map(|error| error.norm());
             let median = median(lengths.filter(|length| length.is_finite())).unwrap_or(0.0);
             let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
             let text = format!(
@@ -213,13 +220,34 @@ impl Check for HeldOutReached {
                         "base[{base}] is held where it is declared, while another base is free: \
                          free it in [parameters], \"base[{base}].*\" = {{ free = true }}"
                     )),
-                    None => finding,
+                    None => match mistake(fit, &row_kind, (&rows, &errors)) {
+                        Some(words) => finding.with_remedy(format!(
+                            "{words}; correct these rows, or hold out others"
+                        )),
+                        None => finding,
+                    },
                 }
             };
             (spread > MIN_SPREAD && median > MAX_MISS * spread && median > noise).then(finding)
         };
         fit.kinds().into_iter().filter_map(of_kind).collect()
     }
+}
+
+/// Returns the words for the mistake with which the fitted arm predicts held-out `rows` of a kind
+/// about as well as it fits the others; `None` if there is none, or if the fit is far off too.
+fn mistake(
+    fit: &CheckedFit,
+    kind: &RowKind,
+    (rows, errors): (&[usize], &[Vector3<f64>]),
+) -> Option<String> {
+    let is_sound = fit.has_further_fits && Misfit.check(fit).is_empty();
+    if !(is_sound && kind.observation.is_position()) {
+        return None;
+    }
+    let fitted = fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, &fit.end.x));
+    let limit = (MAX_MISTAKEN_RATIO * fit.rms(rows, errors)).min(MAX_RATIO_TO_FITTED * fitted);
+    MistakenRows { fit, x: &fit.end.x, rows, limit }.cause()
 }
 
 /// Returns the name of a base that held-out rows use and of which no coordinate is free, while those

@@ -17,18 +17,18 @@ use crate::problem::{Observation, ParameterRule, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number};
 
-/// Smallest share of the misfit, beyond what noise explains, that a held parameter takes away if it
-/// is free. It is then named.
-const MIN_EXPLAINED_SHARE: f64 = 0.8;
-/// Smallest share that the linearised fit must promise, at which the parameter is fitted in full.
-const MIN_EXPECTED_SHARE: f64 = 0.5;
+/// Smallest share of the misfit, beyond what noise explains, that a held parameter, or two of them,
+/// take away if they are free. They are then named.
+const MIN_EXPLAINED_SHARES: [f64; 2] = [0.8, 0.95];
+/// Smallest share that the linearised fit must promise, at which they are fitted in full.
+const MIN_EXPECTED_SHARES: [f64; 2] = [0.5, 0.8];
 /// Smallest share that a held base takes away if it is free and no single parameter explains the
 /// misfit. A base is seldom known as well as the geometry, so that it is named beside other causes.
 const MIN_SHARE_OF_BASE: f64 = 0.5;
 /// Pattern of the parameters of the base.
 const BASE: &str = "base.*";
-/// Maximum number of held parameters that are fitted in full, each by itself: those with the
-/// largest expected share.
+/// Maximum number of held parameters that are fitted in full, each by itself, and of pairs of them:
+/// those with the largest expected share.
 const MAX_FITTED: usize = 3;
 /// Smallest squared length of a column, as a fraction of its length before the free parameters are
 /// fitted, at which the data tell the held parameter from them.
@@ -44,8 +44,8 @@ const FIELDS: [&str; 5] = ["alpha", "a", "theta", "d", "beta"];
 /// Largest deviation, in σ of a usual prior, with which that prior is recommended.
 const MAX_PRIOR_SIGMAS: f64 = 3.0;
 
-/// Checks that no single parameter of the geometry that the problem holds causes most of a misfit
-/// which contradicts the declared σ.
+/// Checks that no parameter of the geometry that the problem holds, and no two of them, cause most of
+/// a misfit which contradicts the declared σ.
 pub(super) struct HeldGeometryIsRight;
 
 impl Check for HeldGeometryIsRight {
@@ -73,13 +73,14 @@ struct Trial {
     left_out: f64,
 }
 
-/// Held parameter with the result of a fit in which it is free.
+/// Held parameters with the result of a fit in which they are free.
 struct Freed {
-    name: String,
-    /// Fitted deviation from nominal, with its unit.
-    deviation: String,
-    /// Freedom to write in `[parameters]`: a usual prior, or none if the deviation contradicts it.
-    freedom: &'static str,
+    names: Vec<String>,
+    /// Fitted deviations from nominal, with their units.
+    deviations: Vec<String>,
+    /// Freedom of each to write in `[parameters]`: a usual prior, or none if the deviation
+    /// contradicts it.
+    freedoms: Vec<&'static str>,
     trial: Trial,
 }
 
@@ -99,74 +100,94 @@ impl Trial {
     }
 }
 
-/// Returns the finding that names the held parameter which explains most of the misfit.
+/// Returns the finding that names the held parameter, or the two, which explain most of the misfit.
 fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
-    let names = promising(fit).unwrap_or_default();
+    let [single, pairs] = promising(fit).unwrap_or_default();
     // A problem with the base free is refused beyond this number.
     let sessions = fit.fitting.measurements.session.names.len();
     let may_move = !fit.is_base_free() && sessions <= MAX_FITTED_BASES;
-    if names.is_empty() && !may_move {
+    if single.is_empty() && pairs.is_empty() && !may_move {
         return None;
     }
     let rows = fit.kind(leading).rows;
     // All fits have the declared σ, so that the priors weigh equally.
-    let refit = |problem: &Problem, name: Option<&str>| {
+    let refit = |problem: &Problem, names: &[String]| {
         fit.with_problem(problem, |fitting| {
             let end = fitting.run(&fitting.registered().ok()?).ok()?;
-            if name == Some(BASE) {
-                let moved = (shown_base(fitting, &end), "free = true");
-                return Some((Some(moved), Trial::of(fit, &rows, (fitting, &end))));
-            }
-            let mut parameters = fitting.model.parameters.iter().zip(end.x.iter());
-            let freed = parameters.find(|(parameter, _)| Some(parameter.name.as_str()) == name);
-            let freed = freed.map(|(parameter, x)| (shown(parameter, *x), prior(parameter, *x)));
-            Some((freed, Trial::of(fit, &rows, (fitting, &end))))
+            let freed = |name: &String| {
+                if name == BASE {
+                    return Some((shown_base(fitting, &end), "free = true"));
+                }
+                let mut parameters = fitting.model.parameters.iter().zip(end.x.iter());
+                let (parameter, x) = parameters.find(|(parameter, _)| parameter.name == *name)?;
+                Some((shown(parameter, *x), prior(parameter, *x)))
+            };
+            let freed: Option<Vec<_>> = names.iter().map(freed).collect();
+            Some((freed?, Trial::of(fit, &rows, (fitting, &end))))
         })?
     };
-    let (_, declared) = refit(fit.problem, None)?;
+    let (_, declared) = refit(fit.problem, &[])?;
     let noise =
         fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x)).powi(2) / fit.noise_factor;
     let misfit = (declared.rms.powi(2) - noise).max(0.0);
     let limit = |share: f64| (1.0 - share).mul_add(misfit, noise);
-    let fitted = |name: &String| {
-        let problem = with_free(fit.problem, [name.clone()]);
-        let (freed, trial) = refit(&problem, Some(name))?;
-        let (deviation, freedom) = freed?;
-        Some(Freed { name: name.clone(), deviation, freedom, trial })
+    let fitted = |names: &Vec<String>| {
+        let problem = with_free(fit.problem, names.iter().cloned());
+        let (freed, trial) = refit(&problem, names)?;
+        let (deviations, freedoms) = freed.into_iter().unzip();
+        Some(Freed { names: names.clone(), deviations, freedoms, trial })
     };
-    let mut freed: Vec<Freed> = names.iter().filter_map(fitted).collect();
-    let is_better = |trial: &Trial, share| {
-        trial.rms.powi(2) <= limit(share) && trial.left_out < declared.left_out
+    let explaining = |sets: &[Vec<String>], share: f64| -> Vec<Freed> {
+        let is_better = |freed: &Freed| {
+            freed.trial.rms.powi(2) <= limit(share) && freed.trial.left_out < declared.left_out
+        };
+        sets.iter().filter_map(fitted).filter(is_better).collect()
     };
-    freed.retain(|freed| is_better(&freed.trial, MIN_EXPLAINED_SHARE));
+    let mut freed = explaining(&single, MIN_EXPLAINED_SHARES[0]);
+    if freed.is_empty() {
+        freed = explaining(&pairs, MIN_EXPLAINED_SHARES[1]);
+    }
     if freed.is_empty() && may_move {
-        let base = fitted(&BASE.to_owned());
-        freed.extend(base.filter(|base| is_better(&base.trial, MIN_SHARE_OF_BASE)));
+        freed = explaining(&[vec![BASE.to_owned()]], MIN_SHARE_OF_BASE);
     }
     freed.sort_by(|a, b| a.trial.left_out.total_cmp(&b.trial.left_out));
     let best = freed.first()?;
     let is_alike = |other: &&Freed| other.trial.left_out <= MAX_RATIO_ALIKE * best.trial.left_out;
-    let mut alike: Vec<&str> =
-        freed[1..].iter().filter(is_alike).map(|other| other.name.as_str()).collect();
-    let set_up = held_set_up(fit, &best.name);
-    alike.extend(set_up);
+    let mut alike: Vec<String> =
+        freed[1..].iter().filter(is_alike).map(|other| other.names.join(" with ")).collect();
+    let is_single = best.names.len() == 1;
+    let set_up = held_set_up(fit, &best.names[0]).filter(|_| is_single);
+    alike.extend(set_up.map(str::to_owned));
+    let [it, they_are, deviate, their] = if is_single {
+        ["it", "it is", "it deviates", "is held at its nominal value"]
+    } else {
+        ["them", "they are", "they deviate", "are held at their nominal values"]
+    };
     let others = match alike.as_slice() {
         [] => String::new(),
-        names => format!(" (these poses do not tell it from {})", names.join(" or ")),
+        names => format!(" (these poses do not tell {it} from {})", names.join(" or ")),
     };
     let text = format!(
-        "{} is held at its nominal value{others}: if it is free, it deviates by {}, and the rms \
-         error is {} instead of {}",
-        best.name,
-        best.deviation,
+        "{} {their}{others}: if {they_are} free, {deviate} by {}, and the rms error is {} instead \
+         of {}",
+        best.names.join(" and "),
+        best.deviations.join(" and "),
         format_error(leading.kind(), best.trial.rms, 3),
         format_error(leading.kind(), declared.rms, 3)
     );
-    let remedy = match set_up {
-        Some(set_up) => format!("free it in [parameters]: \"{set_up}\" = {{ free = true }}"),
-        None => format!("free it in [parameters]: \"{}\" = {{ {} }}", best.name, best.freedom),
+    let rules = match set_up {
+        Some(set_up) => format!("\"{set_up}\" = {{ free = true }}"),
+        None => {
+            let rules = best.names.iter().zip(&best.freedoms);
+            let rules = rules.map(|(name, freedom)| format!("\"{name}\" = {{ {freedom} }}"));
+            rules.collect::<Vec<_>>().join(", ")
+        }
     };
-    let numbers = [json!(best.name), json!(alike), declared.rms.into(), best.trial.rms.into()];
+    let verb = if is_single { "free it" } else { "free both" };
+    let remedy = format!("{verb} in [parameters]: {rules}");
+    let together = best.names[1..].iter().cloned();
+    let alike: Vec<String> = together.chain(alike).collect();
+    let numbers = [json!(best.names[0]), json!(alike), declared.rms.into(), best.trial.rms.into()];
     Some(Finding::new(FindingCode::HeldParameter, numbers, text).with_remedy(remedy))
 }
 
@@ -221,26 +242,34 @@ fn with_free(declared: &Problem, names: impl IntoIterator<Item = String>) -> Pro
     problem
 }
 
-/// Returns the held parameters that promise to explain most of the misfit, best first.
+/// Returns the held parameters, and the pairs of them, that promise to explain most of the misfit,
+/// best first.
 ///
 /// The gain in χ² of a column h is (h⊥ᵀ r)² / ‖h⊥‖², where h⊥ is the part of h outside the columns
-/// of the free parameters. These columns and r are extended by the rows of the priors.
-fn promising(fit: &CheckedFit) -> Option<Vec<String>> {
+/// of the free parameters. These columns and r are extended by the rows of the priors. A second
+/// column gains the same of its part outside the first one.
+fn promising(fit: &CheckedFit) -> Option<[Vec<Vec<String>>; 2]> {
     let is_free = |name: &str| fit.fitting.model.parameters.iter().any(|found| found.name == name);
     let joints = 1..=fit.problem.joints.len();
     let all = joints.flat_map(|joint| FIELDS.map(|field| format!("joint{joint}.{field}")));
     let held: Vec<String> = all.filter(|name| !is_free(name)).collect();
     let problem = with_free(fit.problem, held.iter().cloned());
-    let mut gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))?;
-    gains.retain(|(_, share)| *share >= MIN_EXPECTED_SHARE);
-    gains.sort_by(|a, b| b.1.total_cmp(&a.1));
-    gains.truncate(MAX_FITTED);
-    Some(gains.into_iter().map(|(index, _)| held[index].clone()).collect())
+    let gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))?;
+    let best = |count: usize| {
+        let share = MIN_EXPECTED_SHARES[count - 1];
+        let is_of = |(set, gain): &&(Vec<usize>, f64)| set.len() == count && *gain >= share;
+        let mut sets: Vec<&(Vec<usize>, f64)> = gains.iter().filter(is_of).collect();
+        sets.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let names = |(set, _): &(Vec<usize>, f64)| set.iter().map(|&k| held[k].clone()).collect();
+        sets.into_iter().take(MAX_FITTED).map(names).collect()
+    };
+    Some([best(1), best(2)])
 }
 
-/// Returns the share of the misfit beyond noise that each of the `held` parameters is expected to
-/// take away, with its index, at the parameters of `fit`. `fitting` has all of them free.
-fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Vec<(usize, f64)> {
+/// Returns the share of the misfit beyond noise that each of the `held` parameters, and each pair of
+/// them, is expected to take away, with their indices, at the parameters of `fit`. `fitting` has all
+/// of them free.
+fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Vec<(Vec<usize>, f64)> {
     let names = fit.fitting.model.parameters.iter().map(|parameter| parameter.name.as_str());
     let known: std::collections::HashMap<&str, f64> =
         names.zip(fit.end.x.iter().copied()).collect();
@@ -278,13 +307,26 @@ fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Vec<(usize, f6
     let Linearisation { triangle, projected, .. } = triangle.into_linearisation();
     let misfit = residual.norm_squared() * (1.0 - fit.noise_factor.recip());
     let beyond_free = projected.rows_range(free.len()..);
-    let gain = |(column, (index, place)): (usize, (usize, usize))| {
+    let beyond_free = beyond_free.clone_owned();
+    let outside = |(column, (index, place)): (usize, (usize, usize))| {
         let part = triangle.column(free.len() + column);
-        let part = part.rows_range(free.len()..);
-        let (before, after) = (jacobian.column(place).norm_squared(), part.norm_squared());
-        let slope = part.dot(&beyond_free);
-        (after > MIN_OWN_SHARE * before).then(|| (index, slope * slope / after / misfit))
+        let part: DVector<f64> = part.rows_range(free.len()..).clone_owned();
+        let before = jacobian.column(place).norm_squared();
+        (part.norm_squared() > MIN_OWN_SHARE * before).then_some((index, part))
     };
     let placed = places.iter().enumerate().filter_map(|(index, place)| Some((index, (*place)?)));
-    placed.enumerate().filter_map(gain).collect()
+    let outside: Vec<(usize, DVector<f64>)> = placed.enumerate().filter_map(outside).collect();
+    let gain = |part: &DVector<f64>| part.dot(&beyond_free).powi(2) / part.norm_squared() / misfit;
+    let mut gains = Vec::new();
+    for (k, (first, part)) in outside.iter().enumerate() {
+        let of_first = gain(part);
+        gains.push((vec![*first], of_first));
+        for (second, other) in &outside[..k] {
+            let rest = other - part * (part.dot(other) / part.norm_squared());
+            if rest.norm_squared() > MIN_OWN_SHARE * other.norm_squared() {
+                gains.push((vec![*second, *first], of_first + gain(&rest)));
+            }
+        }
+    }
+    gains
 }

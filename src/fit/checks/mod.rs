@@ -23,6 +23,7 @@ mod limits;
 pub(super) mod misfit;
 mod misread;
 pub(super) mod misreading;
+mod mistaken_rows;
 pub(super) mod nominal_error;
 pub(super) mod open_directions;
 pub(super) mod open_views;

@@ -20,6 +20,8 @@ pub(super) const MIN_ROWS: usize = 4;
 /// Number of evenly spaced rows of an order at which a change of all unknowns is tried. One try
 /// takes a time that grows with the cube of the number of unknowns.
 const ARM_ROWS: usize = 12;
+/// Maximum number of divisions of the poses between two values of some unknowns.
+const PASSES: usize = 20;
 
 /// Place of the model that may change between two rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -74,6 +76,15 @@ pub(super) struct Step {
     pub columns: usize,
 }
 
+/// Sums of the normal equations of a linearised fit: A, b, the cost at the fit, and the number of
+/// measured coordinates beyond the unknowns.
+struct Sums {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+    cost: f64,
+    freedom: f64,
+}
+
 /// Sums over the rows after a change, for one place.
 struct PlaceSums {
     place: Place,
@@ -119,11 +130,21 @@ impl Linear {
             right[k] += precision[k] * x[k];
             cost += precision[k] * x[k] * x[k];
         }
+        let freedom = stage.count().saturating_sub(precision.len()).max(1) as f64;
+        let sums = Sums { matrix, right, cost, freedom };
+        Self::solved((jacobian, residual), sums, (coordinates, 0.5 * precision))
+    }
+
+    /// Finds the smallest cost of the unknowns with these sums.
+    fn solved(
+        (jacobian, residual): (DMatrix<f64>, DVector<f64>),
+        Sums { matrix, right, cost, freedom }: Sums,
+        (coordinates, difference): (usize, DVector<f64>),
+    ) -> Option<Self> {
         let lower = Cholesky::new(matrix)?.unpack();
         let reduced = lower.solve_lower_triangular(&jacobian.transpose())?;
         let slope = lower.solve_lower_triangular(&right)?;
         let cost = cost - slope.norm_squared();
-        let freedom = stage.count().saturating_sub(precision.len()).max(1) as f64;
         let linear = Self {
             jacobian,
             residual,
@@ -133,9 +154,95 @@ impl Linear {
             cost,
             freedom,
             coordinates,
-            difference: 0.5 * precision,
+            difference,
         };
         (cost.is_finite() && cost > 0.0).then_some(linear)
+    }
+
+    /// Returns the linearised fit in which the unknowns in `columns` may also have other values in the
+    /// poses at `places`: a free change of each is added to the unknowns.
+    pub fn with_change(&self, columns: &[usize], places: &[usize]) -> Option<Self> {
+        let (n, added) = (self.jacobian.ncols(), columns.len());
+        let mut jacobian = self.jacobian.clone().resize_horizontally(n + added, 0.0);
+        for &place in places {
+            let from = self.coordinates * place;
+            let moved = self.jacobian.rows(from, self.coordinates).select_columns(columns);
+            jacobian.view_mut((from, n), (self.coordinates, added)).copy_from(&moved);
+        }
+        let changes = jacobian.columns(n, added).clone_owned();
+        let mut matrix = jacobian.tr_mul(&jacobian);
+        matrix.view_mut((0, 0), (n, n)).copy_from(&(&self.lower * self.lower.transpose()));
+        for k in n..n + added {
+            // A change that the unknowns explain themselves has no influence.
+            matrix[(k, k)] += 1e-9 * matrix[(k, k)] + f64::MIN_POSITIVE;
+        }
+        let mut right = (&self.lower * &self.slope).resize_vertically(n + added, 0.0);
+        right.rows_mut(n, added).copy_from(&changes.tr_mul(&self.residual));
+        let cost = self.cost + self.slope.norm_squared();
+        let freedom = (self.freedom - added as f64).max(1.0);
+        let sums = Sums { matrix, right, cost, freedom };
+        let difference = self.difference.clone().resize_vertically(n + added, 0.0);
+        Self::solved((jacobian, self.residual.clone()), sums, (self.coordinates, difference))
+    }
+
+    /// Returns the change of the unknowns from the fit to the smallest cost.
+    fn solution(&self) -> Option<DVector<f64>> {
+        self.lower.tr_solve_lower_triangular(&self.slope).map(|x| -x)
+    }
+
+    /// Returns the poses, and the change in them of the unknowns in `columns`, with which poses of two
+    /// values of these unknowns are told apart best, and the smallest cost with this change. The
+    /// poses that change are fewer than the others.
+    pub fn two_values(&self, columns: &[usize]) -> Option<(Vec<usize>, DVector<f64>, f64)> {
+        let count = self.jacobian.nrows() / self.coordinates;
+        let of_pose = |pose: usize, residual: &DVector<f64>| {
+            let from = self.coordinates * pose;
+            let moved = self.jacobian.rows(from, self.coordinates).select_columns(columns);
+            let residual = residual.rows(from, self.coordinates).clone_owned();
+            (moved, residual)
+        };
+        let residual = &self.residual + &self.jacobian * self.solution()?;
+        // The change of the unknowns that each pose asks for by itself.
+        let asked: Vec<DVector<f64>> = (0..count)
+            .map(|pose| {
+                let (moved, residual) = of_pose(pose, &residual);
+                let normal = moved.tr_mul(&moved);
+                factor(normal).map_or_else(
+                    || DVector::zeros(columns.len()),
+                    |factor| -factor.solve(&moved.tr_mul(&residual)),
+                )
+            })
+            .collect();
+        let mean = asked.iter().sum::<DVector<f64>>() / count as f64;
+        let scatter: DMatrix<f64> =
+            asked.iter().map(|at| (at - &mean) * (at - &mean).transpose()).sum();
+        let eigen = scatter.symmetric_eigen();
+        let axis = eigen.eigenvectors.column(eigen.eigenvalues.imax()).clone_owned();
+        let mut places: Vec<usize> =
+            (0..count).filter(|&pose| (&asked[pose] - &mean).dot(&axis) > 0.0).collect();
+        for _ in 0..PASSES {
+            if 2 * places.len() > count {
+                places = (0..count).filter(|pose| !places.contains(pose)).collect();
+            }
+            if places.len() < MIN_ROWS {
+                return None;
+            }
+            let changed = self.with_change(columns, &places)?;
+            let solution = changed.solution()?;
+            let change = solution.rows_range(self.jacobian.ncols()..).clone_owned();
+            let unchanged =
+                &self.residual + &self.jacobian * solution.rows_range(..self.jacobian.ncols());
+            let is_nearer = |pose: &usize| {
+                let (moved, residual) = of_pose(*pose, &unchanged);
+                (&residual + moved * &change).norm_squared() < residual.norm_squared()
+            };
+            let nearer: Vec<usize> = (0..count).filter(is_nearer).collect();
+            if nearer == places {
+                return Some((places, change, changed.cost));
+            }
+            places = nearer;
+        }
+        None
     }
 
     /// Returns the best change of one place that is not the whole arm, in an order of the rows:

@@ -16,6 +16,7 @@ mod known_arm;
 mod masses;
 mod reversed;
 mod search;
+mod some_rows;
 mod target;
 mod undo;
 mod views;
@@ -28,6 +29,7 @@ pub(in crate::fit) use images::is_of_views;
 pub(crate) use known_arm::misread_table;
 pub(in crate::fit) use masses::misread_masses;
 pub(in crate::fit) use search::{MAX_CLEAR_RATIO, MAX_NOISE_SIGMAS};
+pub(in crate::fit) use some_rows::reading_of_rows;
 pub(in crate::fit) use views::{start_of_fit, with_readings};
 
 use crate::model::parameter::JointField;

@@ -1,0 +1,341 @@
+//! Search for the mistake in rows that do not fit the arm of the other rows.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{DVector, Vector3};
+
+use super::checked_fit::CheckedFit;
+use super::doubted_columns::{column_name, moving};
+use super::misreading::reading_of_rows;
+use crate::fit::SolverChoice;
+use crate::fit::stages::fitting::Fitting;
+use crate::fit::stages::stage::Stage;
+use crate::measurement::{Measurements, Split};
+use crate::model::Pose;
+use crate::model::parameter::{Parameter, ParameterSite};
+use crate::problem::JointKind;
+
+/// Minimum number of rows that show where the base or the target stands.
+const MIN_MOVED_ROWS: usize = 6;
+/// Minimum number of successive rows that show base and target together.
+const MIN_REGISTERED_ROWS: usize = 12;
+/// Largest ratio of the error with a moved base to that with a moved target, at which the base moved.
+const MAX_RATIO_TO_TARGET: f64 = 0.5;
+/// Units of a length that a table may confuse: factors of the measured numbers, with their words.
+const LENGTH_FACTORS: [(f64, &str); 6] = [
+    (1e3, "multiply them by 1000"),
+    (1e-3, "divide them by 1000"),
+    (10.0, "multiply them by 10"),
+    (0.1, "divide them by 10"),
+    (25.4, "multiply them by 25.4"),
+    (1.0 / 25.4, "divide them by 25.4"),
+];
+
+/// Names of the coordinates of a position.
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// Rows that do not fit the arm of the other rows.
+pub(super) struct MistakenRows<'a, 'f> {
+    pub fit: &'f CheckedFit<'a>,
+    /// Full parameter vector of the arm that the other rows fit.
+    pub x: &'f DVector<f64>,
+    /// Indices of the rows in the table.
+    pub rows: &'f [usize],
+    /// Largest rms error of the rows with the mistake corrected \[m\].
+    pub limit: f64,
+}
+
+impl MistakenRows<'_, '_> {
+    /// Returns the words for the mistake that explains the rows; `None` if none does.
+    pub fn cause(&self) -> Option<String> {
+        let table = self.fit.fitting.measurements;
+        let errors = self.fit.fitting.position_errors(self.rows, self.x);
+        let measured = self.rows.iter().map(|&row| table.positions[row]);
+        let pairs = measured.zip(errors).map(|(measured, error)| (measured, measured - error));
+        let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = pairs.collect();
+        self.of_other_word()
+            .or_else(|| mistake(&pairs, self.limit))
+            .or_else(|| self.of_other_joint_angles())
+            .or_else(|| self.of_joints())
+            .or_else(|| self.of_moved_place())
+            .or_else(|| reading_of_rows(self.fit, (self.x, self.limit), self.rows))
+            .or_else(|| self.of_unit())
+    }
+
+    /// Returns the words for rows that fit with the words of other sessions or targets.
+    fn of_other_word(&self) -> Option<String> {
+        let placement = self.fit.fitting.placement;
+        // Without a column target each session has its target.
+        let has_targets = placement.targets != placement.bases;
+        let in_session = |pose: &Pose<'_>, base: usize| {
+            let word = placement.bases.get(base)?;
+            let has_target = placement.targets.get(pose.target) == placement.bases.get(pose.base);
+            let target = placement.targets.iter().position(|of| of == word && has_target);
+            (pose.base != base).then_some((base, target.unwrap_or(pose.target)))
+        };
+        let of_target = |pose: &Pose<'_>, target: usize| {
+            (has_targets && pose.target != target).then_some((pose.base, target))
+        };
+        self.of_word(("session", &placement.bases), &in_session)
+            .or_else(|| self.of_word(("target", &placement.targets), &of_target))
+    }
+
+    /// Returns the words for rows that each fit with another of `words` of a column. `placed` returns
+    /// base and target of a row with another word, by index; `None` for its own word.
+    fn of_word(
+        &self,
+        (column, words): (&str, &[String]),
+        placed: &dyn Fn(&Pose<'_>, usize) -> Option<(usize, usize)>,
+    ) -> Option<String> {
+        let mut found = BTreeSet::new();
+        for pose in &self.fit.fitting.poses(self.rows) {
+            let others = (0..words.len()).filter_map(|word| Some((word, placed(pose, word)?)));
+            let (others, places): (Vec<usize>, Vec<(usize, usize)>) = others.unzip();
+            let poses = places.into_iter().map(|(base, target)| Pose { base, target, ..*pose });
+            let errors = self.fit.fitting.model.residuals(poses.collect::<Vec<_>>(), self.x);
+            let near = errors.iter().position(|error| error.norm() < self.limit)?;
+            found.insert(words[others[near]].as_str());
+        }
+        let found: Vec<&str> = found.into_iter().collect();
+        Some(format!(
+            "they fit in {column} {} instead: correct the column {column}",
+            found.join(" or ")
+        ))
+    }
+
+    /// Returns the words for positions that belong to the joint angles of other rows of the table. A
+    /// shift leaves a row without a position.
+    fn of_other_joint_angles(&self) -> Option<String> {
+        let Self { fit, x, rows: chosen, limit } = *self;
+        let table = fit.fitting.measurements;
+        let is_position = |row: &usize| table.observation(*row).is_position();
+        let every_row: Vec<usize> = (0..table.len()).filter(is_position).collect();
+        let errors = fit.fitting.position_errors(&every_row, x);
+        let predicted: Vec<(usize, Vector3<f64>)> = every_row
+            .iter()
+            .zip(errors)
+            .map(|(&row, error)| (row, table.positions[row] - error))
+            .collect();
+        let base_of = |row: usize| fit.fitting.placement.base_of(row);
+        let source = |row: &usize| {
+            let distance = |of: &&(usize, Vector3<f64>)| (of.1 - table.positions[*row]).norm();
+            let of_base = predicted.iter().filter(|of| base_of(of.0) == base_of(*row));
+            let nearest = of_base.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            (nearest.0 != *row && distance(&nearest) < limit).then_some((*row, nearest.0))
+        };
+        let sources: Vec<(usize, usize)> = chosen.iter().filter_map(source).collect();
+        if sources.len() < chosen.len().saturating_sub(1).max(2) {
+            return None;
+        }
+        let are_shifted = |by: isize| {
+            let shifted =
+                sources.iter().filter(|(row, of)| row.checked_add_signed(by) == Some(*of));
+            shifted.count() >= chosen.len().saturating_sub(1).max(2)
+        };
+        let are_exchanged = || {
+            let others: BTreeSet<usize> = sources.iter().map(|&(_, of)| of).collect();
+            others.len() == sources.len() && others.iter().all(|of| chosen.contains(of))
+        };
+        if are_shifted(-1) {
+            Some("their positions belong to the joint angles of the row before".to_owned())
+        } else if are_shifted(1) {
+            Some("their positions belong to the joint angles of the row after".to_owned())
+        } else {
+            are_exchanged()
+                .then(|| "their positions belong to each other's joint angles".to_owned())
+        }
+    }
+
+    /// Returns the words for a mistake in the joint columns: angles in another unit, or the sign of a
+    /// joint.
+    fn of_joints(&self) -> Option<String> {
+        let Self { fit, x, rows: chosen, limit } = *self;
+        let table = fit.fitting.measurements;
+        let joints: Vec<usize> = moving(fit).collect();
+        let is_turning =
+            |joint: &usize| fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
+        let turning: Vec<usize> = joints.iter().copied().filter(is_turning).collect();
+        let fits = |changed: &[usize], factor: f64| {
+            let mut corrected = table.clone();
+            for &row in chosen {
+                for &joint in changed {
+                    corrected.configurations[row * table.joints + joint] *= factor;
+                }
+            }
+            let fitting = Fitting { measurements: &corrected, ..fit.fitting.with_declared_noise() };
+            fit.rms(chosen, &fitting.position_errors(chosen, x)) < limit
+        };
+        let in_degrees = 1_f64.to_radians();
+        if fits(&turning, in_degrees.recip()) {
+            return Some(
+                "their joint angles are in radians, unlike those of the others".to_owned(),
+            );
+        }
+        if fits(&turning, in_degrees) {
+            return Some(
+                "their joint angles are in degrees, unlike those of the others".to_owned(),
+            );
+        }
+        let joint = joints.into_iter().find(|&joint| fits(&[joint], -1.0))?;
+        Some(format!("their {} has the other sign", column_name(table, joint)))
+    }
+
+    /// Returns the words for rows that fit where the target or the base, or both, stand elsewhere.
+    fn of_moved_place(&self) -> Option<String> {
+        let (model, rows) = (self.fit.fitting.model, self.rows);
+        if rows.len() < MIN_MOVED_ROWS {
+            return None;
+        }
+        let fitting = Fitting { turn_sigma: None, ..self.fit.fitting.with_declared_noise() };
+        let split = Split { identification: rows.to_vec(), held_out: Vec::new() };
+        let is_base = |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
+        // A base may have turned far.
+        let located = of_rows(self.fit, fitting.measurements, &split, |of_rows| of_rows.located());
+        let moved = |is_moved: &dyn Fn(&Parameter) -> bool| {
+            let unknowns: Vec<usize> =
+                (0..model.parameters.len()).filter(|&k| is_moved(&model.parameters[k])).collect();
+            let stage = Stage {
+                solver: SolverChoice::Auto.decide(model),
+                custom_solver: None,
+                progress: None,
+                linear_model: None,
+                ..fitting.stage(rows, unknowns.clone())
+            };
+            let mut start = self.x.clone();
+            let bases = unknowns.iter().filter(|&&k| is_base(&model.parameters[k]));
+            bases.for_each(|&k| start[k] = located[k]);
+            let x = stage.run(&start).ok().filter(|_| !unknowns.is_empty())?.x;
+            let rms = self.fit.rms(rows, &fitting.position_errors(rows, &x));
+            // The largest shift and turn of all bases or targets.
+            let size = |from: usize| {
+                let of_axis = unknowns.iter().filter_map(|&k| match model.parameters[k].site {
+                    ParameterSite::Target { target: of, axis }
+                    | ParameterSite::Base { base: of, axis } => {
+                        (axis / 3 == from).then_some((of, (x[k] - self.x[k]).powi(2)))
+                    }
+                    _ => None,
+                });
+                let mut squares: BTreeMap<usize, f64> = BTreeMap::new();
+                of_axis.for_each(|(of, square)| *squares.entry(of).or_default() += square);
+                squares.into_values().fold(0.0, f64::max).sqrt()
+            };
+            Some((rms, [size(0), size(1)]))
+        };
+        let is_target =
+            |parameter: &Parameter| matches!(parameter.site, ParameterSite::Target { .. });
+        let target = moved(&is_target).filter(|(rms, _)| *rms < self.limit);
+        let limit = target.map_or(self.limit, |(rms, _)| MAX_RATIO_TO_TARGET * rms);
+        if let Some((_, [shift, turn])) = moved(&is_base).filter(|(rms, _)| *rms < limit) {
+            let (shift, turn) = (1e3 * shift, turn.to_degrees());
+            return Some(format!(
+                "they fit where the base stands elsewhere, by {shift:.1} mm and {turn:.2}°: if the \
+                 instrument or the base was moved, give them another word in a column session"
+            ));
+        }
+        if let Some((_, [shift, _])) = target {
+            return Some(format!(
+                "they fit with the target {:.1} mm elsewhere in its frame: if the reflector was put \
+                 into another nest, give them another word in a column target",
+                1e3 * shift
+            ));
+        }
+        let both = |parameter: &Parameter| is_target(parameter) || is_base(parameter);
+        let is_enough = rows.len() >= MIN_REGISTERED_ROWS;
+        let both = if is_enough { moved(&both) } else { None };
+        both.filter(|(rms, _)| *rms < self.limit).map(|_| {
+            "they fit where base and target stand elsewhere: if both were moved, give them another \
+             word in the columns session and target"
+                .to_owned()
+        })
+    }
+
+    /// Returns the words for positions in another unit, from another base.
+    fn of_unit(&self) -> Option<String> {
+        let table = self.fit.fitting.measurements;
+        let fits = |&(factor, _): &(f64, &str)| {
+            let mut converted = table.clone();
+            for &row in self.rows {
+                converted.positions[row] *= factor;
+            }
+            let rms = registration_error(self.fit, &converted, self.rows);
+            rms.is_some_and(|rms| rms < self.limit)
+        };
+        let has_enough = self.rows.len() >= MIN_REGISTERED_ROWS;
+        let mut factors = LENGTH_FACTORS.into_iter().filter(|_| has_enough);
+        factors.find(fits).map(|(_, words)| format!("their positions are in another unit: {words}"))
+    }
+}
+
+/// Returns the rms error of the nominal arm after its registration to the `chosen` rows of
+/// `measurements` alone \[m\].
+fn registration_error(
+    fit: &CheckedFit,
+    measurements: &Measurements,
+    chosen: &[usize],
+) -> Option<f64> {
+    let split = Split { identification: chosen.to_vec(), held_out: Vec::new() };
+    of_rows(fit, measurements, &split, |fitting| {
+        let x = fitting.registered().ok()?;
+        Some(fit.rms(chosen, &fitting.position_errors(chosen, &x)))
+    })
+}
+
+/// Calls `evaluate` with the fit of the identification rows of `split` alone.
+pub(super) fn of_rows<R>(
+    fit: &CheckedFit,
+    measurements: &Measurements,
+    split: &Split,
+    evaluate: impl FnOnce(&Fitting) -> R,
+) -> R {
+    let Fitting { placement, model, .. } = *fit.fitting;
+    let held_out_only = placement.held_out_only(model, measurements, split);
+    let declared = fit.fitting.with_declared_noise();
+    let fitting = Fitting { split, measurements, turn_sigma: None, held_out_only, ..declared };
+    evaluate(&fitting)
+}
+
+/// Function of a measured and a predicted position that returns the corrected measurement.
+type Correction<'a> = dyn Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + 'a;
+
+/// Returns the words for a mistake that explains pairs of measured and predicted positions to
+/// `limit` \[m\].
+fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String> {
+    let fits = |corrected: &Correction| {
+        let square = |(measured, predicted): &(Vector3<f64>, Vector3<f64>)| {
+            (corrected(measured, predicted) - predicted).norm_squared()
+        };
+        (pairs.iter().map(square).sum::<f64>() / pairs.len() as f64).sqrt() < limit
+    };
+    let sign = (0..3).find(|&axis| {
+        fits(&|measured, _| {
+            let mut corrected = *measured;
+            corrected[axis] = -corrected[axis];
+            corrected
+        })
+    });
+    if let Some(axis) = sign {
+        return Some(format!("their {} has the other sign", NAMES[axis]));
+    }
+    let exchanged = [(0, 1), (0, 2), (1, 2)].into_iter().find(|&(first, second)| {
+        fits(&|measured, _| {
+            let mut corrected = *measured;
+            corrected.swap_rows(first, second);
+            corrected
+        })
+    });
+    if let Some((first, second)) = exchanged {
+        return Some(format!("their {} and {} are exchanged", NAMES[first], NAMES[second]));
+    }
+    let mut factors = LENGTH_FACTORS.into_iter();
+    if let Some((_, words)) = factors.find(|(factor, _)| fits(&|measured, _| measured * *factor)) {
+        return Some(format!("their positions are in another unit: {words}"));
+    }
+    let axis = (0..3).find(|&axis| {
+        fits(&|measured, predicted| {
+            let mut corrected = *measured;
+            corrected[axis] = predicted[axis];
+            corrected
+        })
+    });
+    axis.map(|axis| format!("their {} alone is wrong", NAMES[axis]))
+}
