@@ -63,9 +63,9 @@ pub fn after_fit(
         Strategy::OneSweep | Strategy::GeometryOnly | Strategy::StiffnessOnly => true,
         _ => false,
     };
-    let correct = || {
-        format!("correct the table or {file} as the warning says, then flexcal identify {named}")
-    };
+    let as_warned =
+        |what: &str| format!("{what} as the warning says, then flexcal identify {named}");
+    let correct = || as_warned(&format!("correct the table or {file}"));
     // A remainder in the problem comes from a loop, which has searched for causes already.
     let search = if is_partial {
         format!("flexcal identify {named} fits all parameters at once, elasticity included")
@@ -79,7 +79,7 @@ pub fn after_fit(
     };
     match report::influential_rows_advice(found, &common.problem_file()) {
         _ if !found.is_trusted() && CORRECTED_IN_TABLE.iter().any(|code| found.has(*code)) => {
-            format!("correct the table as the warning says, then flexcal identify {named}")
+            as_warned("correct the table")
         }
         _ if report::is_prior_contradicted(found) => {
             format!("flexcal identify {named} fits these rows without the prior")
@@ -101,13 +101,10 @@ pub fn after_fit(
             )
         }
         None if found.has(FindingCode::Misread) => correct(),
-        None if found.has(FindingCode::LensContradicted) => format!(
-            "correct or free the intrinsics in {file} as the warning says, then flexcal identify \
-             {named}"
-        ),
-        None if found.has(FindingCode::ViewsUndecided) => format!(
-            "add views or declare a place as the warning says, then flexcal identify {named}"
-        ),
+        None if found.has(FindingCode::LensContradicted) => {
+            as_warned(&format!("correct or free the intrinsics in {file}"))
+        }
+        None if found.has(FindingCode::ViewsUndecided) => as_warned("add views or declare a place"),
         None if holds_a_wrong_fixture(found) => {
             format!(
                 "correct or free in {file} what the warning names, then flexcal identify {named}"

@@ -9,7 +9,7 @@ use flexcal::error::WarningKind;
 use flexcal::fit::{self, Identification, Options, SolverChoice, Strategy};
 use flexcal::life::{PriorError, Update, update};
 use flexcal::measurement::Dataset;
-use flexcal::problem::{Freedom, HeldOut, ParameterRule, Problem};
+use flexcal::problem::{HeldOut, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
 use flexcal::report::{self, PredictionAccuracy};
 use flexcal::results::{
@@ -199,13 +199,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let sources = sources.as_ref().map(report::joint_sources_text);
     let outcome =
         diagnostic::report_fit_once(&identification, (common.quiet, common.prints_text()));
-    let is_any_freed = |rule: &ParameterRule| !matches!(rule.freedom, Freedom::Fixed);
-    if identification.unknowns.is_empty() && problem.parameters.iter().any(is_any_freed) {
-        diagnostic::warn(
-            "no parameter is fitted, although [parameters] frees some: later lines hold all of them, \
-             or no parameter of this arm has such a name",
-        );
-    }
+    common.warn_if_all_is_held(&problem, &identification);
     common.print_result(&json, || {
         let accuracy = PredictionAccuracy::new(&identification, &shown);
         let told = if arguments.verbose {

@@ -111,7 +111,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut tips = arguments.tip.iter().map(|tip| Some(tip.as_str()));
     let to = |tip: Option<&str>| Chain::new(&robot, arguments.base.as_deref(), tip);
     let chain = to(tips.next().flatten())?;
-    let chain = if arguments.board.is_some() { chain.to_carrier_of_camera()? } else { chain };
+    let chain = if arguments.board.is_some() { chain.up_to_carrier_of_camera()? } else { chain };
     let further = in_tree_order(&chain, tips.map(to).collect::<Result<_, _>>()?)?;
     if arguments.board.is_some() && further.len() > 1 {
         return Err(

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::error::{InputError, InputErrorKind, TableErrorKind, Warning, WarningKind};
-use flexcal::fit::{self, SavedEstimate};
+use flexcal::fit::{self, Identification, SavedEstimate};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{Freedom, ParameterRule, Problem};
 use flexcal::report::shell_word;
@@ -202,6 +202,17 @@ impl Common {
                  \"joint*.alpha\" = {{ sigma_deg = 1.0 }}, \"joint*.a\" = {{ sigma_mm = 5.0 }}, \"joint*.theta\" = {{ sigma_deg = 1.0 }}, \
                  \"joint*.d\" = {{ sigma_mm = 5.0 }}, \"base.*\" = {{ free = true }}"
             ));
+        }
+    }
+
+    /// Warns if nothing was fitted although rules free parameters.
+    pub fn warn_if_all_is_held(&self, problem: &Problem, found: &Identification) {
+        let is_freed = |rule: &ParameterRule| !matches!(rule.freedom, Freedom::Fixed);
+        if found.unknowns.is_empty() && problem.parameters.iter().any(is_freed) && !self.quiet {
+            diagnostic::warn(
+                "no parameter is fitted, although [parameters] frees some: later lines hold all of \
+                 them, or no parameter of this arm has such a name",
+            );
         }
     }
 

@@ -28,8 +28,7 @@ const MAX_LISTED_ROWS: usize = 10;
 const MAX_PLAUSIBLE_MEDIAN_GAP: f64 = 0.5;
 /// Smallest number of measured rows with which the pairing as a whole is checked.
 const MIN_CHECKED_ROWS: usize = 4;
-/// Number of measured rows of which one may have another partner with the clocks moved, before the
-/// pairing is refused.
+/// Number of measured rows of which one may have another partner with the clocks moved.
 const MIN_ROWS_PER_ODD_PARTNER: usize = 20;
 
 /// Rows of the joint table, with the keys by which they are paired with measured rows.
@@ -362,9 +361,9 @@ impl JoinedLog {
         let (left, rows, logged) = (self.unpaired.len(), self.requested, self.rows.len());
         let shift = self.shift();
         let offset = || shift.clone().map(|(_, offset)| offset);
-        let unused = self.rows.iter().filter(|row| row.uses == 0).count();
-        // An instrument that also measures between poses has many rows without a partner.
-        let are_most_left = 2 * left > rows && 2 * unused > logged;
+        // An instrument may also measure between poses.
+        let used = self.rows.iter().filter(|row| row.uses > 0).count();
+        let are_most_left = 2 * left > rows && 2 * used < logged;
         if are_most_left
             && let Some((difference, pair)) =
                 usual_difference(&self.unpaired_names, self.unused_names())
@@ -430,8 +429,7 @@ impl JoinedLog {
             return None;
         }
         let measured = are_whole_minutes(self.times.iter().copied());
-        let logged = are_whole_minutes(self.log_times.iter().map(|time| time - offset));
-        match (measured, logged) {
+        match (measured, are_whole_minutes(self.log_times.iter().map(|time| time - offset))) {
             (true, false) => Some("measurements"),
             (false, true) => Some("joint table"),
             _ => None,
@@ -440,9 +438,9 @@ impl JoinedLog {
 
     /// Returns the names of the joint table that are no partner.
     fn unused_names(&self) -> Vec<&str> {
-        let is_unused = |row: usize| self.rows.get(row).is_some_and(|row| row.uses == 0);
-        let names = self.of_name.iter().filter(|(_, row)| is_unused(**row));
-        names.map(|(name, _)| &**name).collect()
+        let uses = |row: &usize| self.rows.get(*row).map(|row| row.uses);
+        let unused = self.of_name.iter().filter(|(_, row)| uses(row) == Some(0));
+        unused.map(|(name, _)| &**name).collect()
     }
 
     /// Returns examples of the keys of both tables for a message: one name of each, or the ranges
@@ -452,8 +450,7 @@ impl JoinedLog {
             let log = self.of_name.iter().min_by_key(|(_, row)| **row)?.0;
             return Some([name, log].map(|name| format!("\"{}\"", shortened(name))));
         }
-        let time =
-            |row: Option<&usize>| row.and_then(|&row| self.rows.get(row)).map(|row| row.time);
+        let time = |row: Option<&usize>| self.rows.get(*row?).map(|row| row.time);
         let log = [time(self.by_time.first())?, time(self.by_time.last())?];
         let range = |[first, last]: [f64; 2]| format!("{} to {}", shown(first), shown(last));
         let first = self.times.iter().copied().reduce(f64::min)?;

@@ -39,7 +39,7 @@ impl Chain<'_> {
     ///
     /// # Errors
     /// Returns the errors of [`Chain::new`].
-    pub(crate) fn to_carrier_of_camera(self) -> Result<Self, InputError> {
+    pub(crate) fn up_to_carrier_of_camera(self) -> Result<Self, InputError> {
         let name = |link: usize| self.robot.link_name(link);
         let is_camera = |link: usize| {
             let lower = name(link).to_lowercase();
@@ -78,8 +78,9 @@ pub(crate) fn in_tree_order<'a>(
             let pairs = chain.stages.iter().zip(&last.stages);
             pairs.take_while(|(one, other)| one.joint == other.joint).count()
         };
-        let nearest = (0..further.len()).rev().max_by_key(|&place| shared(&further[place]));
-        let next = further.remove(nearest.unwrap_or(0));
+        let places = further.iter().enumerate().rev();
+        let nearest = places.max_by_key(|(_, chain)| shared(chain)).map_or(0, |(place, _)| place);
+        let next = further.remove(nearest);
         if std::iter::once(first).chain(&ordered).any(|other| other.tip == next.tip) {
             let name = next.ends().1.to_owned();
             return Err(first.robot.error(UrdfErrorKind::RepeatedTip { name }));

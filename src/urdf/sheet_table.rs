@@ -10,19 +10,21 @@ use crate::error::{InputError, Location, UrdfErrorKind};
 use crate::problem::item::Document;
 use crate::problem::quoted;
 
-/// Keys of a joint that a table may have, the angles among them first, and their other names.
-const KEYS: [(&str, &[&str]); 6] = [
-    ("theta", &["θ", "offset"]),
-    ("alpha", &["α", "twist"]),
-    ("min", &["lower"]),
-    ("max", &["upper"]),
-    ("d", &["s"]),
-    ("a", &["r"]),
+/// Key with other names and its units.
+type Key = (&'static str, &'static [&'static str], Option<[&'static str; 2]>);
+/// Units of angles and of lengths in the header.
+const ANGLES: [&str; 2] = ["deg", "rad"];
+const LENGTHS: [&str; 2] = ["mm", "m"];
+/// Keys of a joint that a table may have, with their other names and their units; those of limits
+/// depend on the joint.
+const KEYS: [Key; 6] = [
+    ("theta", &["θ", "offset"], Some(ANGLES)),
+    ("alpha", &["α", "twist"], Some(ANGLES)),
+    ("d", &["s"], Some(LENGTHS)),
+    ("a", &["r"], Some(LENGTHS)),
+    ("min", &["lower"], None),
+    ("max", &["upper"], None),
 ];
-/// Number of those of [`KEYS`] that are angles.
-const ANGLES: usize = 4;
-/// Index of `d` in [`KEYS`].
-const D: usize = 4;
 
 /// Names of a joint coordinate in a cell, without its number.
 const COORDINATES: [&str; 6] = ["q", "θ", "theta", "t", "d", "s"];
@@ -30,8 +32,7 @@ const COORDINATES: [&str; 6] = ["q", "θ", "theta", "t", "d", "s"];
 /// Column of a table that is read.
 struct Column {
     place: usize,
-    /// Index in [`KEYS`].
-    key: usize,
+    key: &'static str,
     unit: &'static str,
 }
 
@@ -60,9 +61,12 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
             None => location,
         }
     };
+    let line = |position: Option<&csv::Position>| {
+        position.map_or(1, |position| usize::try_from(position.line()).unwrap_or(usize::MAX))
+    };
     let bad = |error: &csv::Error| {
-        let line = error.position().map_or(1, |position| position.line() as usize);
-        place(line, None).error(UrdfErrorKind::SheetCell { cell: error.to_string() })
+        place(line(error.position()), None)
+            .error(UrdfErrorKind::SheetCell { cell: error.to_string() })
     };
     let header = reader.headers().map_err(|error| bad(&error))?.clone();
     let columns = columns(&header, |column| place(1, Some(column)))?;
@@ -74,7 +78,7 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
     );
     for record in reader.records() {
         let record = record.map_err(|error| bad(&error))?;
-        let line = record.position().map_or(1, |position| position.line() as usize);
+        let line = line(record.position());
         if record.iter().all(str::is_empty) {
             continue;
         }
@@ -88,11 +92,12 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
             let comma = if delimiter == b',' { ',' } else { '.' };
             let cell = cell.replace(',', &comma.to_string());
             let (value, is_variable) = number(&cell, column.unit).ok_or_else(unreadable)?;
-            if is_variable && column.key == D {
+            if is_variable && column.key == "d" {
                 entries.push("kind = \"prismatic\"".to_owned());
             }
-            if !cell.is_empty() && (value != 0.0 || KEYS[column.key].0.starts_with('m')) {
-                entries.push(format!("{}_{} = {value}", KEYS[column.key].0, column.unit));
+            let is_limit = ["min", "max"].contains(&column.key);
+            if !cell.is_empty() && (value != 0.0 || is_limit) {
+                entries.push(format!("{}_{} = {value}", column.key, column.unit));
             }
         }
         let _ = writeln!(out, "  {{ {} }},", entries.join(", "));
@@ -110,8 +115,9 @@ fn columns(
         let lower = name.to_lowercase();
         let end = lower.find(|c: char| !c.is_alphabetic()).unwrap_or(lower.len());
         let (word, rest) = lower.split_at(end);
-        let is_meant = |(key, others): &(&str, &[&str])| *key == word || others.contains(&word);
-        let Some(key) = KEYS.iter().position(is_meant) else { continue };
+        let mut keys = KEYS.iter();
+        let is_meant = |(key, others, _): &&Key| *key == word || others.contains(&word);
+        let Some(&(key, _, units)) = keys.find(is_meant) else { continue };
         let unit = match rest.trim_matches(|c: char| !c.is_alphanumeric() && c != '°') {
             "deg" | "degree" | "degrees" | "°" => Some("deg"),
             "rad" => Some("rad"),
@@ -119,19 +125,18 @@ fn columns(
             "m" => Some("m"),
             _ => None,
         };
-        let units = if key < ANGLES { ["deg", "rad"] } else { ["mm", "m"] };
-        let is_limit = KEYS[key].0.starts_with('m');
-        let unit = unit.filter(|unit| is_limit || units.contains(unit)).ok_or_else(|| {
-            let write = units.map(|unit| format!("{}_{unit}", KEYS[key].0)).join(" or ");
+        let is_right = |unit: &&str| units.is_none_or(|units| units.contains(unit));
+        let unit = unit.filter(is_right).ok_or_else(|| {
+            let write = units.unwrap_or(ANGLES).map(|unit| format!("{key}_{unit}")).join(" or ");
             at(name).error(UrdfErrorKind::SheetUnit { write })
         })?;
         columns.push(Column { place, key, unit });
     }
-    let has = |key: &str| columns.iter().any(|column| KEYS[column.key].0 == key);
+    let has = |key: &str| columns.iter().any(|column| column.key == key);
     if !(has("alpha") && (has("a") || has("d"))) {
         return Err(at("alpha").error(UrdfErrorKind::SheetWithoutParameters));
     }
-    columns.sort_by_key(|column| column.key);
+    columns.sort_by_key(|column| KEYS.iter().position(|(key, ..)| *key == column.key));
     Ok(columns)
 }
 

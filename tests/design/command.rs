@@ -87,7 +87,7 @@ fn measured_poses_that_are_held_out_do_not_count() {
     // The forecast is that of the fitted rows alone.
     let rows = std::fs::read_to_string(path("tests/cases/a-none.csv")).unwrap();
     let is_fitted = |line: &&str| !line.contains("validation");
-    let fitted: String = rows.lines().filter(is_fitted).map(|line| format!("{line}\n")).collect();
+    let fitted = rows.lines().filter(is_fitted).collect::<Vec<_>>().join("\n") + "\n";
     folder.write("fitted.csv", fitted);
     let file = folder.path("fitted.csv");
     let alone = flexcal(&folder, &format!("{plan} --data {} --json", file.display())).json();

@@ -175,13 +175,12 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
         format_error(leading.kind(), best.trial.rms, 3),
         format_error(leading.kind(), declared.rms, 3)
     );
-    let rules = match set_up {
-        Some(set_up) => format!("\"{set_up}\" = {{ free = true }}"),
-        None => {
-            let rules = best.names.iter().zip(&best.freedoms);
-            let rules = rules.map(|(name, freedom)| format!("\"{name}\" = {{ {freedom} }}"));
-            rules.collect::<Vec<_>>().join(", ")
-        }
+    let rules = if let Some(set_up) = set_up {
+        format!("\"{set_up}\" = {{ free = true }}")
+    } else {
+        let rules = best.names.iter().zip(&best.freedoms);
+        let rules = rules.map(|(name, freedom)| format!("\"{name}\" = {{ {freedom} }}"));
+        rules.collect::<Vec<_>>().join(", ")
     };
     let verb = if is_single { "free it" } else { "free both" };
     let remedy = format!("{verb} in [parameters]: {rules}");

@@ -34,6 +34,9 @@ const LENGTH_FACTORS: [(f64, &str); 6] = [
 /// Names of the coordinates of a position.
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
+/// Returns base and target of a row with another word of a column, by index; `None` for its own word.
+type PlacedWith<'f> = dyn Fn(&Pose<'_>, usize) -> Option<(usize, usize)> + 'f;
+
 /// Rows that do not fit the arm of the other rows.
 pub(super) struct MistakenRows<'a, 'f> {
     pub fit: &'f CheckedFit<'a>,
@@ -85,7 +88,7 @@ impl MistakenRows<'_, '_> {
     fn of_word(
         &self,
         (column, words): (&str, &[String]),
-        placed: &dyn Fn(&Pose<'_>, usize) -> Option<(usize, usize)>,
+        placed: &PlacedWith<'_>,
     ) -> Option<String> {
         let mut found = BTreeSet::new();
         for pose in &self.fit.fitting.poses(self.rows) {
@@ -190,6 +193,7 @@ impl MistakenRows<'_, '_> {
         let split = Split { identification: rows.to_vec(), held_out: Vec::new() };
         let is_base = |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
         // A base may have turned far.
+        #[expect(clippy::redundant_closure_for_method_calls, reason = "a path has one lifetime")]
         let located = of_rows(self.fit, fitting.measurements, &split, |of_rows| of_rows.located());
         let moved = |is_moved: &dyn Fn(&Parameter) -> bool| {
             let unknowns: Vec<usize> =

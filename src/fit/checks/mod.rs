@@ -26,6 +26,7 @@ pub(super) mod misreading;
 mod mistaken_rows;
 pub(super) mod nominal_error;
 pub(super) mod open_directions;
+mod open_scale;
 pub(super) mod open_views;
 mod orientation;
 pub(super) mod outliers;

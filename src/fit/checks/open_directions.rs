@@ -10,12 +10,13 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::open_scale::scaled_lengths;
 use super::open_views;
 use crate::fit::stages::parameter_size::plausible_size;
 use crate::least_squares::{UnidentifiableCombination, Weak};
 use crate::measurement::Measurements;
 use crate::model::parameter::Parameter;
-use crate::problem::{Joint, JointKind, Observation, Problem};
+use crate::problem::Problem;
 use crate::quantity::Unit;
 
 /// Largest squared part of a unit direction outside a set of unknowns at which the direction lies
@@ -143,7 +144,9 @@ impl Check for NamedDirections {
         }
         // The nominal arm misses contacts, so that another scale changes the data there.
         if open.iter().all(|quantity| quantity.kind != Open::Scale) {
-            open.extend(scale(fit.problem, fit.fitting.measurements, &names));
+            let lengths = scaled_lengths(fit.problem, fit.fitting.measurements, &names);
+            let scale = |names| OpenQuantity { kind: Open::Scale, names, unknowns: Vec::new() };
+            open.extend(lengths.map(scale));
         }
         let mut findings: Vec<Finding> = open.into_iter().map(finding).collect();
         // A pose that the rows determine only within decimetres is open, too.
@@ -174,57 +177,8 @@ pub(crate) fn open_scale(
     table: &Measurements,
     unknowns: &[&str],
 ) -> Option<String> {
-    let OpenQuantity { kind, names, .. } = scale(problem, table, unknowns)?;
-    Some(kind.words(&listed(&names)).join("; "))
-}
-
-/// Returns the scale with the lengths that change in proportion if no row measures a length:
-/// contacts with points at unknown places remain contacts if all lengths have one factor. `None` if
-/// a length is known.
-///
-/// Lengths that other unknowns make up for may be held: those of the first joint, which move all
-/// points, and those from d of the last joint on, which move the target. Priors give the scale, but
-/// do not measure it. The commands of a sliding joint are known lengths.
-fn scale(problem: &Problem, table: &Measurements, unknowns: &[&str]) -> Option<OpenQuantity> {
-    let is_free = |name: &str| unknowns.contains(&name);
-    let has_axes = |group: &str| "xyz".chars().all(|axis| is_free(&format!("{group}.{axis}")));
-    let is_unknown = |observation: &Observation| match *observation {
-        Observation::Point(point) => (problem.fixtures.get(point))
-            .is_some_and(|point| has_axes(&format!("point[{}]", point.name))),
-        Observation::Tilt(_) => true,
-        _ => false,
-    };
-    let rows: Vec<Observation> = (0..table.len()).map(|row| table.observation(row)).collect();
-    if !rows.iter().any(|row| row.is_point())
-        || !rows.iter().all(is_unknown)
-        || !problem.distances.is_empty()
-    {
-        return None;
-    }
-    let has_other_lengths =
-        |joint: &Joint| joint.beam.is_some() || joint.command_kind() == JointKind::Prismatic;
-    if problem.is_elastic()
-        || problem.joints.iter().any(has_other_lengths)
-        || !problem.targets.is_empty()
-        || !has_axes("tool")
-    {
-        return None;
-    }
-    let moves = |joint: &Joint| joint.command_kind() != JointKind::Fixed;
-    let last = problem.joints.iter().rposition(moves)?;
-    let mut lengths = Vec::new();
-    for (index, joint) in problem.joints.iter().enumerate().take(last + 1).skip(1) {
-        let placed = joint.placement.as_ref().map_or([0.0; 3], |placed| placed.xyz.into());
-        let d = if index == last { 0.0 } else { joint.d };
-        let entries =
-            [("a", joint.a), ("d", d), ("x", placed[0]), ("y", placed[1]), ("z", placed[2])];
-        for (field, _) in entries.into_iter().filter(|(_, length)| *length != 0.0) {
-            lengths.push(format!("joint{}.{field}", index + 1));
-        }
-    }
-    let are_free = lengths.iter().all(|name| is_free(name));
-    let found = OpenQuantity { kind: Open::Scale, names: lengths, unknowns: Vec::new() };
-    (are_free && !found.names.is_empty()).then_some(found)
+    let lengths = scaled_lengths(problem, table, unknowns)?;
+    Some(Open::Scale.words(&listed(&lengths)).join("; "))
 }
 
 /// Returns a sentence with a remedy for each kind of quantity that unidentifiable `combinations` of
