@@ -122,8 +122,9 @@ fn seen(problem: &Problem, [delay, row_time]: [f64; 2], noise: f64) -> Measureme
         for (row, pixel) in predicted.iter().enumerate() {
             let is_of_hand = rows.observation(row).fixtures()[0] == Some(0);
             let time = if is_of_hand { delay + row_time * pixel.y } else { 0.0 };
-            for joint in row * rows.joints..(row + 1) * rows.joints {
-                moved.configurations[joint] = rows.configurations[joint] + time * velocities[joint];
+            let of_row = (0..rows.joints).map(|joint| row * rows.joints + joint);
+            for (joint, velocity) in of_row.map(|place| (place, velocities[place])) {
+                moved.configurations[joint] = rows.configurations[joint] + time * velocity;
             }
         }
     }
