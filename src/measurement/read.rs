@@ -86,8 +86,8 @@ impl Measurements {
         Self::read_column_table(table, problem, Use::Planned)
     }
 
-    /// Reads files for a purpose. If the joint tables are given with them, a difference of the clocks
-    /// is their own: rows are then paired with the offset that is found, and a warning states it.
+    /// Reads files for a purpose. If the joint tables are given with them, the declared offset is not
+    /// theirs: rows are paired with the one that is found, and a warning states it.
     fn read_table(
         files: &[PathBuf],
         problem: &Problem,

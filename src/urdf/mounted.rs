@@ -50,9 +50,9 @@ pub(super) fn mount(
         let Some((parent, carried)) = carrying_link(branches, arm, *carrier) else { continue };
         let origin = carried.compose(pose);
         // The link of a camera may have its name itself, as "head_camera_optical".
-        let own = link.strip_suffix("_optical_frame").filter(|name| name.contains("optical"));
+        let bare = link.strip_suffix("_optical_frame").filter(|name| name.contains("optical"));
         let position = |name: &str| robot.links.iter().position(|known| known.name == name);
-        let Some(index) = own.and_then(position).or_else(|| position(link)) else {
+        let Some(index) = bare.and_then(position).or_else(|| position(link)) else {
             let name = robot.links.get(parent).map_or("", |link| link.name.as_str());
             patches.append_link(link, name, &origin);
             continue;

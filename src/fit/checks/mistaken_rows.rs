@@ -34,7 +34,8 @@ const LENGTH_FACTORS: [(f64, &str); 6] = [
 /// Names of the coordinates of a position.
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
-/// Returns base and target of a row with another word of a column, by index; `None` for its own word.
+/// Returns base and target of a row with another word of a column, by index; `None` for the word
+/// that it has.
 type PlacedWith<'f> = dyn Fn(&Pose<'_>, usize) -> Option<(usize, usize)> + 'f;
 
 /// Rows that do not fit the arm of the other rows.
@@ -84,7 +85,8 @@ impl MistakenRows<'_, '_> {
     }
 
     /// Returns the words for rows that each fit with another of `words` of a column. `placed` returns
-    /// base and target of a row with another word, by index; `None` for its own word.
+    /// base and target of a row with another word, by index; `None` for the
+    /// word that it has.
     fn of_word(
         &self,
         (column, words): (&str, &[String]),
