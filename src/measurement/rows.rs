@@ -203,8 +203,9 @@ impl RowsBuilder {
         if let Some(other) = &mut measurements.other_configurations {
             other.resize((row + 1) * joints, 0.0);
         }
-        for column in [&mut measurements.approach, &mut measurements.velocities] {
-            column.iter_mut().for_each(|of_joints| of_joints.resize((row + 1) * joints, 0.0));
+        let of_joints = [&mut measurements.approach, &mut measurements.velocities];
+        for column in of_joints.into_iter().flatten() {
+            column.resize((row + 1) * joints, 0.0);
         }
         if !measurements.time_measured {
             measurements.time.push(row as f64);
