@@ -101,10 +101,7 @@ pub fn after_fit(
             )
         }
         None if found.has(FindingCode::Misread) => correct(),
-        None if found.has(FindingCode::LensContradicted) => {
-            as_warned(&format!("correct or free the intrinsics in {file}"))
-        }
-        None if found.has(FindingCode::ViewsUndecided) => as_warned("add views or declare a place"),
+        None if let Some(what) = camera_advice(found, &file) => as_warned(&what),
         None if holds_a_wrong_fixture(found) => {
             format!(
                 "correct or free in {file} what the warning names, then flexcal identify {named}"
@@ -395,6 +392,16 @@ pub fn strategy_argument(estimate: &SavedEstimate) -> String {
 fn measures_no_position(problem: &Problem) -> bool {
     let has_camera = problem.fixtures.iter().any(|fixture| fixture.kind.word() == "camera");
     has_camera && problem.data.position_sigma.is_none()
+}
+
+/// Returns what to do about a lens or views that are the reason not to trust a fit; `None` if neither
+/// is.
+fn camera_advice(found: &Identification, file: &str) -> Option<String> {
+    if found.has(FindingCode::LensContradicted) {
+        return Some(format!("correct or free the intrinsics in {file}"));
+    }
+    let are_open = found.has(FindingCode::ViewsUndecided);
+    are_open.then(|| "add views or declare a place".to_owned())
 }
 
 /// States what to do about the first camera with a coordinate that the rows do not determine; `None`

@@ -12,7 +12,7 @@ use super::harmonic_prior::admits_common_prior;
 use super::rules::SelectionRules;
 use crate::fit::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
-use crate::model::effect::{DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
+use crate::model::effect::{DataCoverage, NO_REFERENCE, NO_TEMPERATURE, NO_VELOCITIES};
 use crate::numeric::range;
 use crate::observation::Needs;
 use crate::problem::{Effect, Problem};
@@ -158,10 +158,14 @@ impl<'a> Data<'a> {
             payload: payload.map_or([problem.tool.payload_mass; 2].into(), range),
             ranges: (0..n).map(column).collect(),
             covariates: self.declared_covariates().map(varies).collect(),
-            velocities: measurements.velocities.as_ref().is_some_and(|velocities| {
-                let of_row = |row: usize| &velocities[row * n..(row + 1) * n];
-                self.rows().iter().any(|&row| of_row(row).iter().any(|of_joint| *of_joint != 0.0))
-            }),
+            no_velocities: measurements.velocities.as_ref().map_or(
+                Some(NO_VELOCITIES),
+                |velocities| {
+                    let of_row = |row: &usize| &velocities[row * n..(row + 1) * n];
+                    let mut moving = self.rows().iter().flat_map(of_row);
+                    moving.all(|velocity| *velocity == 0.0).then_some(NO_VELOCITIES)
+                },
+            ),
             times: self.shift_times(),
             clock: measurements.clock(),
             gravity: problem.gravity,

@@ -1,12 +1,14 @@
-//! A parameter of the geometry that the problem holds, although it deviates, is named.
+//! Parameters of the geometry that the problem holds or confines by priors, although they deviate,
+//! are named.
 
 use flexcal::fit::FindingCode;
 
 use nalgebra::{Rotation3, Vector3};
 
 use crate::common::arms::parse;
-use crate::common::made::fit_as_command;
+use crate::common::made::{fit, fit_as_command};
 use crate::judged::{PRIORS, measured, text};
+use crate::trusted::simulated;
 
 #[test]
 fn a_held_parameter_that_causes_the_misfit_is_named() {
@@ -57,4 +59,29 @@ fn a_held_base_is_offered_before_the_joint_that_acts_as_it_does() {
     let words = finding.unwrap_or_else(|| panic!("{:?}", found.findings)).to_string();
     assert!(words.contains("joint1.d is held"), "{words}");
     assert!(words.contains("\"base.*\" = { free = true }"), "{words}");
+}
+
+#[test]
+fn deviations_far_beyond_their_priors_state_the_rule_that_allows_them() {
+    let priors = "'joint*.a' = { sigma_mm = 2 }\n'joint*.alpha' = { sigma_deg = 0.3 }\n\
+                  'joint*.d' = { sigma_mm = 2 }\n'joint*.theta' = { sigma_deg = 0.3 }\n\
+                  'tool.*' = { sigma_mm = 2 }";
+    let problem = parse(&text(priors));
+    let truth = [
+        ("joint1.a", 24e-3),
+        ("joint2.a", 18e-3),
+        ("joint3.a", -26e-3),
+        ("joint4.a", 20e-3),
+        ("joint5.a", -19e-3),
+    ];
+    let data = simulated(&problem, &truth, [80, 30], 3);
+    let found = fit(&problem, &data);
+    let beyond = found.finding(FindingCode::BeyondPrior).unwrap().to_string();
+    println!("{beyond}");
+    let (_, rule) = beyond.split_once("so far from nominal, write in [parameters] ").unwrap();
+    assert!(rule.starts_with("\"joint*.a\" = { sigma_mm = "), "{beyond}");
+    let rule = rule.split(" and ").next().unwrap();
+    let allowed = parse(&text(&priors.replace("'joint*.a' = { sigma_mm = 2 }", rule)));
+    let found = fit(&allowed, &data);
+    assert!(found.is_trusted(), "{:?}", found.findings);
 }

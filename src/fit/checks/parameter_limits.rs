@@ -8,8 +8,10 @@ use super::contradicted_entry::contradicted_entry;
 use super::finding::{Finding, FindingCode};
 use super::nominal_error::is_nominal_far_off;
 use crate::fit::stages::parameter_size::largest_deviation;
+use crate::fit::uncertainty::prior_sizes::PriorSize;
 use crate::model::parameter::{JointField, Parameter, ParameterSite};
 use crate::problem::Observation;
+use crate::problem::pattern::matches;
 use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number, two_digits};
 use crate::spatial::{Frame, rotation_between};
@@ -76,8 +78,18 @@ impl Check for WithinPriors {
                      arm, then axes of the measuring frame, signs of joints, units, and the priors"
                 ));
             }
-            match remedy(fit, parameter, sigmas) {
+            let finding = match remedy(fit, parameter, sigmas) {
                 Some(remedy) => finding.with_remedy(remedy),
+                None => finding,
+            };
+            match wider_priors(fit, parameter) {
+                Some(rules) => {
+                    let remedy = format!(
+                        "{}; if the arm may be so far from nominal, write in [parameters] {rules}",
+                        finding.remedy
+                    );
+                    finding.with_remedy(remedy)
+                }
                 None => finding,
             }
         };
@@ -85,6 +97,22 @@ impl Check for WithinPriors {
             largest_ratio(fit, prior_sigmas).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
         largest.map(finding).into_iter().collect()
     }
+}
+
+/// Returns the rules of `[parameters]` with the prior widths that the data indicate, if that of
+/// `parameter` is among those that are too narrow; `None` otherwise.
+fn wider_priors(fit: &CheckedFit, parameter: &Parameter) -> Option<String> {
+    let wider = || fit.prior_sizes.iter().filter(|size| size.found > size.declared);
+    wider().find(|size| matches(&size.pattern, &parameter.name))?;
+    let rule = |size: &PriorSize| {
+        let (key, factor) = match size.unit {
+            Unit::Angle => ("sigma_deg", 1f64.to_degrees()),
+            _ => ("sigma_mm", 1e3),
+        };
+        let found = two_digits(size.found * factor, 4);
+        format!("\"{}\" = {{ {key} = {found} }}", size.pattern)
+    };
+    Some(wider().map(rule).collect::<Vec<_>>().join(" and "))
 }
 
 /// Returns the number of lengths of joints for which `is_far` is true.

@@ -273,9 +273,7 @@ impl Effect {
                 "no columns approach1 …, and a sliding joint has no moment of the loads that \
                  tells the side",
             ),
-            Need::Velocities => {
-                unless(data.velocities, "no columns qd1_deg_per_s … of an arm that moves")
-            }
+            Need::Velocities => data.no_velocities,
             Need::Loads | Need::Play => unless(data.has_gravity(), NO_LOADS),
             Need::Covariate => {
                 let name = self.covariate();

@@ -27,8 +27,9 @@ pub struct DataCoverage {
     pub clock: Option<(f64, f64)>,
     /// For each covariate of the problem, true if it is recorded and varies.
     pub covariates: Vec<bool>,
-    /// True if velocities of joints are recorded and not all zero.
-    pub velocities: bool,
+    /// Reason why effects of velocities cannot be shown. `None` if velocities of joints are recorded
+    /// and not all zero.
+    pub no_velocities: Option<&'static str>,
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<f64>,
     /// True if a part that the problem declares gives way to loads.
@@ -62,6 +63,8 @@ pub const NO_TEMPERATURE: &str = "no temperature that changes";
 /// Reason why a temperature effect cannot be shown although the temperature is recorded: the
 /// problem declares no reference.
 pub const NO_REFERENCE: &str = "the problem declares no reference_temperature_C";
+/// Reason why an effect of the velocities of joints cannot be shown.
+pub const NO_VELOCITIES: &str = "no columns qd1_deg_per_s … of an arm that moves";
 /// Reason why an effect that depends on earlier poses (lag, friction, settling) cannot be shown.
 pub(super) const NO_TIMES: &str = "no column time_s, so the order of the poses is not known";
 /// Reason why a delayed temperature effect cannot be shown: neither times nor temperatures.

@@ -13,5 +13,5 @@ mod terms;
 pub(crate) use candidates::Candidate;
 pub(crate) use candidates::HIGHEST_ORDER;
 pub use candidates::candidates;
-pub(crate) use coverage::{Columns, DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
+pub(crate) use coverage::{Columns, DataCoverage, NO_REFERENCE, NO_TEMPERATURE, NO_VELOCITIES};
 pub(crate) use terms::{Term, parameters};
