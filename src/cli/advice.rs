@@ -105,7 +105,7 @@ pub fn after_fit(
             "correct or free the intrinsics in {file} as the warning says, then flexcal identify \
              {named}"
         ),
-        None if holds_a_wrong_fixture(found) => {
+        None if found.has(FindingCode::HeldParameter) => {
             format!(
                 "correct or free in {file} what the warning names, then flexcal identify {named}"
             )
@@ -184,14 +184,6 @@ fn widen_prior(found: &Identification, file: &str) -> String {
     )
 }
 
-/// Returns true if a held number of a point, an anchor or a surface causes the misfit.
-fn holds_a_wrong_fixture(found: &Identification) -> bool {
-    let held = found.finding(FindingCode::HeldParameter);
-    let is_of =
-        |name: &str| ["point[", "anchor[", "surface["].iter().any(|of| name.starts_with(of));
-    held.and_then(|held| held.word("parameter")).is_some_and(is_of)
-}
-
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared
 /// problem to rows of `measured_poses` poses, and `results` are the files that the loop wrote.
 pub fn after_loop(
@@ -211,6 +203,11 @@ pub fn after_loop(
     }
     if !result.trusted {
         return format!("flexcal identify {named} -v, once the input is corrected");
+    }
+    if fit.has(FindingCode::HeldParameter) {
+        return format!(
+            "correct or free in {file} what the warning names, then flexcal loop {named}"
+        );
     }
     if report::lacks_masses(result) {
         return format!("declare the masses in {file}, then flexcal loop {named}");

@@ -202,7 +202,7 @@ impl Check for HeldOutReached {
             let held_out = fitting.split.held_out.iter().copied().zip(&errors);
             let (rows, errors): (Vec<usize>, Vec<Vector3<f64>>) =
                 held_out.filter(|(row, _)| is_of_kind(*row)).unzip();
-            let lengths = errors.iter().map(|error| error.norm());
+            let lengths = errors.iter().map(nalgebra::Matrix::norm);
             let median = median(lengths.filter(|length| length.is_finite())).unwrap_or(0.0);
             let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
             let text = format!(
