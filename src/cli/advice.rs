@@ -102,7 +102,7 @@ pub fn after_fit(
         }
         None if found.has(FindingCode::Misread) => correct(),
         None if let Some(what) = camera_advice(found, &file) => as_warned(&what),
-        None if holds_a_wrong_fixture(found) => {
+        None if found.has(FindingCode::HeldParameter) => {
             format!(
                 "correct or free in {file} what the warning names, then flexcal identify {named}"
             )
@@ -181,14 +181,6 @@ fn widen_prior(found: &Identification, file: &str) -> String {
     )
 }
 
-/// Returns true if a held number of a point, an anchor or a surface causes the misfit.
-fn holds_a_wrong_fixture(found: &Identification) -> bool {
-    let held = found.finding(FindingCode::HeldParameter);
-    let is_of =
-        |name: &str| ["point[", "anchor[", "surface["].iter().any(|of| name.starts_with(of));
-    held.and_then(|held| held.word("parameter")).is_some_and(is_of)
-}
-
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared
 /// problem to rows of `measured_poses` poses, `after` that with what was added, and `results` are the
 /// files that the loop wrote.
@@ -209,6 +201,11 @@ pub fn after_loop(
     }
     if !result.trusted {
         return format!("flexcal identify {named} -v, once what the warnings name is corrected");
+    }
+    if fit.has(FindingCode::HeldParameter) {
+        return format!(
+            "correct or free in {file} what the warning names, then flexcal loop {named}"
+        );
     }
     if report::lacks_masses(result) {
         return format!("declare the masses in {file}, then flexcal loop {named}");

@@ -30,6 +30,13 @@ fn a_held_parameter_that_causes_the_misfit_is_named() {
     let [before, after] = ["before", "after"].map(|name| finding.unwrap().number(name).unwrap());
     assert!(before > 3.0 * after && after < 2e-4, "{before} {after}");
 
+    // Two that are held cause it together.
+    let two = holding(&["joint3.alpha", "joint4.d"]).findings;
+    let held = two.iter().find(|finding| finding.code == FindingCode::HeldParameter);
+    let words = held.unwrap_or_else(|| panic!("{two:?}")).to_string();
+    assert!(words.contains("are held at their nominal values"), "{words}");
+    assert!(words.contains("free both in [parameters]: \"joint3.alpha\" = {"), "{words}");
+
     // Many that are held cause it together, so that none explains most of it alone.
     let many = holding(&["joint*.*"]);
     assert!(many.has(FindingCode::NoiseBeyondDeclared), "{:?}", many.findings);

@@ -18,6 +18,7 @@ mod identified;
 mod judged;
 mod masses;
 mod misread;
+mod mistaken_rows;
 mod orientation;
 mod recovery;
 mod remainder;

@@ -27,6 +27,14 @@ const MIN_SHARE: f64 = 0.6;
 /// Number of registrations to the rows that fit the one before.
 const PASSES: usize = 3;
 
+/// Words for rows of which no mistake is found.
+const OPEN_CAUSE: &str = "check whether they are of this arm, with the same tool and instrument";
+
+/// Returns true if a finding is on rows of which no mistake is found.
+pub(super) fn is_open(found: &Finding) -> bool {
+    found.code == FindingCode::RowsDoubted && found.text.ends_with(OPEN_CAUSE)
+}
+
 /// Checks, if the fit is far off, that most rows do not fit the nominal arm without the others.
 pub(super) struct RowsBelongTogether;
 
@@ -94,9 +102,7 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     if cause.is_none() && are_few {
         return None;
     }
-    let cause = cause.unwrap_or_else(|| {
-        "check whether they are of this arm, with the same tool and instrument".to_owned()
-    });
+    let cause = cause.unwrap_or_else(|| OPEN_CAUSE.to_owned());
     let listed = if last + 1 - first == apart.len() && apart.len() > 2 {
         format!("the rows from {} to {}", place(first), place(last))
     } else {

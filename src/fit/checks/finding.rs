@@ -212,7 +212,8 @@ finding_codes! {
         "From a row on, one place of the model (target, base, camera, marker, a joint's zero position, or \
          the whole arm) is different: this change explains more than four fifths of what noise does \
          not, neither another order of the rows nor a drift does; the whole arm is named only if \
-         both parts then fit within the declared noise.",
+         both parts then fit within the declared noise. The same of two such changes, or of a target \
+         that sits elsewhere in rows between others.",
         "check what changed between these rows, and fit the rows before and after by themselves";
     NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
         "The nominal arm misses the measurements by more than a tenth of their spread.",
@@ -263,7 +264,7 @@ finding_codes! {
     HeldParameter: Warning "held-parameter" ["parameter", "alike", "before", "after"]
         "A parameter of the geometry that the problem holds explains most of a misfit that \
          contradicts the declared σ: free, it takes away more than four fifths of what noise does \
-         not explain, or the six of a base together more than half. The same of the held numbers \
+         not explain, two of them 19 twentieths, or the six of a base together more than half. The same of the held numbers \
          of a point, an anchor or a surface, which leave less than a twentieth.",
         "free this parameter in [parameters]";
     InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]

@@ -73,6 +73,16 @@ const MIN_RELATED_SHARE: f64 = 0.9;
 /// Smallest share of the rows in which a relation changes the coordinate.
 const MIN_CHANGED_SHARE: f64 = 0.1;
 
+/// Returns an angle between −π and π.
+fn wrapped(angle: f64) -> f64 {
+    angle - (angle / TAU).round() * TAU
+}
+
+/// Returns true if an angle is nearly a whole number of turns.
+fn is_near(angle: f64) -> bool {
+    wrapped(angle).abs() < MAX_DIFFERENCE
+}
+
 /// Minimum number of rows in which a column holds one number.
 const MIN_HELD: usize = 4;
 
@@ -80,18 +90,36 @@ const MIN_HELD: usize = 4;
 /// numbers of its `column` in all rows \[rad\]. Each row is given with its number and the found
 /// coordinate.
 fn relation(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
-    let wrapped = |difference: f64| difference - (difference / TAU).round() * TAU;
-    let is_near = |difference: f64| wrapped(difference).abs() < MAX_DIFFERENCE;
     let count = found.len() as f64;
+    // The angle by which most of some differences agree.
+    let common = |of: &[f64]| {
+        let near = |angle: &&f64| of.iter().filter(|other| is_near(*other - **angle)).count();
+        of.iter().max_by_key(near).map_or((0.0, 0), |angle| (wrapped(*angle), near(&angle)))
+    };
+    let from_own: Vec<f64> = found.iter().map(|of| of.2 - of.1).collect();
+    let (zero, agreeing) = common(&from_own);
+    let is_most = |agreeing: usize| agreeing as f64 >= MIN_RELATED_SHARE * count;
     for (neighbour, by) in [(Neighbour::Before, 1), (Neighbour::After, -1)] {
         let number = |row: usize| column.get(row.checked_add_signed(by)?);
-        let follows = |&&(row, _, coordinate): &&(usize, f64, f64)| {
-            number(row).is_some_and(|number| is_near(coordinate - number))
-        };
-        if found.iter().filter(follows).count() as f64 >= MIN_RELATED_SHARE * count {
+        let from_other: Vec<f64> =
+            found.iter().filter_map(|of| Some(of.2 - number(of.0)?)).collect();
+        if is_most(common(&from_other).1) && !is_most(agreeing) {
             return Some(Relation::OfNeighbour(neighbour));
         }
     }
+    related(found, column).or_else(|| {
+        // The pose of the base may make up for an angle that all coordinates have in common.
+        let aligned: Vec<(usize, f64, f64)> = found
+            .iter()
+            .map(|&(row, command, coordinate)| (row, command, coordinate - zero))
+            .collect();
+        related(&aligned, column)
+    })
+}
+
+/// Does the work of [`relation`] for numbers of their own rows.
+fn related(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
+    let count = found.len() as f64;
     let is_same = |&(_, command, coordinate): &(usize, f64, f64)| is_near(coordinate - command);
     let explains = |is_changed: &dyn Fn(&(usize, f64, f64)) -> bool| {
         let changed: Vec<usize> = found

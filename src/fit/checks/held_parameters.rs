@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::misread::MAX_RATIO_ERROR_OF_ARM;
 use super::row_kind::format_error;
 use crate::fit::Noise;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
@@ -52,8 +53,12 @@ impl Check for HeldGeometryIsRight {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
         let leading = fit.fitting.measurements.leading();
-        // Another reading of the table explains the misfit by itself.
-        let is_misread = fit.explanations.get().is_some_and(|found| !found.fitted.is_empty());
+        // Another reading of the table explains the misfit by itself, unless it is a small error of the
+        // arm or the instrument.
+        let reading = fit.explanations.get().and_then(|found| found.fitted.first());
+        let is_misread = reading.is_some_and(|reading| {
+            reading.effect.as_ref().is_none_or(|(_, size)| size.abs() >= MAX_RATIO_ERROR_OF_ARM)
+        });
         if !(is_contradicted && fit.has_further_fits && leading.is_position())
             || fit.fitting.earlier.is_some()
             || is_misread
@@ -175,13 +180,10 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
         format_error(leading.kind(), best.trial.rms, 3),
         format_error(leading.kind(), declared.rms, 3)
     );
-    let rules = if let Some(set_up) = set_up {
-        format!("\"{set_up}\" = {{ free = true }}")
-    } else {
-        let rules = best.names.iter().zip(&best.freedoms);
-        let rules = rules.map(|(name, freedom)| format!("\"{name}\" = {{ {freedom} }}"));
-        rules.collect::<Vec<_>>().join(", ")
-    };
+    let rules = best.names.iter().zip(&best.freedoms);
+    let rules = rules.map(|(name, freedom)| format!("\"{name}\" = {{ {freedom} }}"));
+    let of_set_up = |set_up| format!("\"{set_up}\" = {{ free = true }}");
+    let rules = set_up.map_or_else(|| rules.collect::<Vec<_>>().join(", "), of_set_up);
     let verb = if is_single { "free it" } else { "free both" };
     let remedy = format!("{verb} in [parameters]: {rules}");
     let together = best.names[1..].iter().cloned();

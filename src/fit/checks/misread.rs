@@ -31,7 +31,7 @@ const MAX_PLAIN_PART: f64 = 0.8;
 
 /// Largest deviation from 1 of a ratio of motion to command, or of a scale, that an arm or an
 /// instrument may have, so that the remedy also names its effect.
-const MAX_RATIO_ERROR_OF_ARM: f64 = 0.03;
+pub(super) const MAX_RATIO_ERROR_OF_ARM: f64 = 0.03;
 
 /// Largest ratio of the rms residual with strategy joint to that of the fit, at which the strategy
 /// causes the residual, not the reading of table or problem.

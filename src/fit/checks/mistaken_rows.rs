@@ -34,10 +34,6 @@ const LENGTH_FACTORS: [(f64, &str); 6] = [
 /// Names of the coordinates of a position.
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
-/// Returns base and target of a row with another word of a column, by index; `None` for the word
-/// that it has.
-type PlacedWith<'f> = dyn Fn(&Pose<'_>, usize) -> Option<(usize, usize)> + 'f;
-
 /// Rows that do not fit the arm of the other rows.
 pub(super) struct MistakenRows<'a, 'f> {
     pub fit: &'f CheckedFit<'a>,
@@ -84,14 +80,9 @@ impl MistakenRows<'_, '_> {
             .or_else(|| self.of_word(("target", &placement.targets), &of_target))
     }
 
-    /// Returns the words for rows that each fit with another of `words` of a column. `placed` returns
-    /// base and target of a row with another word, by index; `None` for the
-    /// word that it has.
-    fn of_word(
-        &self,
-        (column, words): (&str, &[String]),
-        placed: &PlacedWith<'_>,
-    ) -> Option<String> {
+    /// Returns the words for rows that each fit with another of `words` of a column. `placed` is
+    /// the function for these words.
+    fn of_word(&self, (column, words): (&str, &[String]), placed: &Placed) -> Option<String> {
         let mut found = BTreeSet::new();
         for pose in &self.fit.fitting.poses(self.rows) {
             let others = (0..words.len()).filter_map(|word| Some((word, placed(pose, word)?)));
@@ -191,15 +182,27 @@ impl MistakenRows<'_, '_> {
         if rows.len() < MIN_MOVED_ROWS {
             return None;
         }
-        let fitting = Fitting { turn_sigma: None, ..self.fit.fitting.with_declared_noise() };
         let split = Split { identification: rows.to_vec(), held_out: Vec::new() };
         let is_base = |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
+        let Fitting { placement, measurements, .. } = *self.fit.fitting;
+        let held_out_only = placement.held_out_only(model, measurements, &split);
+        let declared = self.fit.fitting.with_declared_noise();
+        let fitting = Fitting { split: &split, turn_sigma: None, held_out_only, ..declared };
         // A base may have turned far.
-        #[expect(clippy::redundant_closure_for_method_calls, reason = "a path has one lifetime")]
-        let located = of_rows(self.fit, fitting.measurements, &split, |of_rows| of_rows.located());
+        let located = fitting.located();
+        let is_used = |parameter: &Parameter| match parameter.site {
+            ParameterSite::Base { base, .. } => {
+                rows.iter().any(|&row| placement.base_of(row) == base)
+            }
+            ParameterSite::Target { target, .. } => {
+                rows.iter().any(|&row| placement.target_of(row) == target)
+            }
+            _ => false,
+        };
         let moved = |is_moved: &dyn Fn(&Parameter) -> bool| {
+            let is_unknown = |parameter: &Parameter| is_moved(parameter) && is_used(parameter);
             let unknowns: Vec<usize> =
-                (0..model.parameters.len()).filter(|&k| is_moved(&model.parameters[k])).collect();
+                (0..model.parameters.len()).filter(|&k| is_unknown(&model.parameters[k])).collect();
             let stage = Stage {
                 solver: SolverChoice::Auto.decide(model),
                 custom_solver: None,
@@ -299,6 +302,10 @@ pub(super) fn of_rows<R>(
     let fitting = Fitting { split, measurements, turn_sigma: None, held_out_only, ..declared };
     evaluate(&fitting)
 }
+
+/// Function of a row and the index of a word that returns the indices of base and target of the row
+/// with that word; `None` for the word that it has.
+type Placed<'a> = dyn Fn(&Pose<'_>, usize) -> Option<(usize, usize)> + 'a;
 
 /// Function of a measured and a predicted position that returns the corrected measurement.
 type Correction<'a> = dyn Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + 'a;

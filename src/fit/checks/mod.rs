@@ -141,6 +141,13 @@ const BEYOND_NOISE: [FindingCode; 2] =
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     let mut findings: Vec<Finding> = CHECKS.iter().flat_map(|check| check.check(fit)).collect();
     state_limits_first(&mut findings);
+    // A change of one place says more about rows than that they contradict the others.
+    let is_of_place = |found: &Finding| {
+        found.code == FindingCode::RowsChanged && found.word("place") != Some("arm")
+    };
+    if findings.iter().any(is_of_place) {
+        findings.retain(|found| !doubted_rows::is_open(found));
+    }
     // A mistake in the whole table or in some rows may look like a change from a row on.
     let is_of_table = |found: &Finding| OF_TABLE.contains(&found.code);
     if findings.iter().any(is_of_table) {

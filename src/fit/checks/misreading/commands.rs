@@ -271,6 +271,11 @@ impl Misreading {
                 q[joint - 1] += radians_per_metre(lead) * q[from - 1];
             }
             Self::Zero { joint, degrees } => q[joint - 1] += f64::from(degrees).to_radians(),
+            Self::Zeros { joints, quarters } => {
+                joints.iter().zip(quarters).for_each(|(joint, quarters)| {
+                    q[joint - 1] += f64::from(quarters) * PI / 2.0;
+                });
+            }
             Self::Ratio { joint, percent } => q[joint - 1] *= f64::from(percent) / 100.0,
             _ => {}
         }

@@ -18,6 +18,7 @@ mod reversed;
 mod search;
 mod some_rows;
 mod target;
+mod two_entries;
 mod undo;
 mod views;
 mod words;
@@ -179,6 +180,18 @@ pub enum Misreading {
         joint: usize,
         /// Angle that must be added to the joint's command \[°\].
         degrees: i16,
+    },
+    /// The zero positions of two joints, counted from 1, are wrong.
+    Zeros {
+        /// Numbers of the joints.
+        joints: [usize; 2],
+        /// Number of quarter turns that must be added to the command of each.
+        quarters: [i8; 2],
+    },
+    /// The angles α of two joints, counted from 1, have the other sign.
+    TwistSigns {
+        /// Numbers of the joints.
+        joints: [usize; 2],
     },
     /// A joint, counted from 1, turns by a multiple of its command.
     Ratio {
@@ -405,7 +418,9 @@ impl Misreading {
     fn group(self) -> (std::mem::Discriminant<Self>, usize, usize, Option<JointField>) {
         let (first, second, field) = match self {
             Self::Zero { joint, .. } | Self::Ratio { joint, .. } => (joint, 0, None),
-            Self::Exchanged { joint, with } => (joint, with, None),
+            Self::Exchanged { joint, with }
+            | Self::Zeros { joints: [joint, with], .. }
+            | Self::TwistSigns { joints: [joint, with] } => (joint, with, None),
             Self::Coupled { joint, from, .. } | Self::Screw { joint, from, .. } => {
                 (joint, from, None)
             }

@@ -9,6 +9,7 @@ use super::Misreading;
 use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
 use super::chosen_rows::chosen_rows;
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
+use super::two_entries::of_two_entries;
 use super::undo::is_unit_ratio;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::common_scale::MIN_SCALE_ERROR;
@@ -149,6 +150,8 @@ pub(super) fn explanations(fit: &CheckedFit) -> Explanations {
     if is_position || near_misreadings(&errors, nominal).is_empty() {
         errors.extend(trial.several_reversed(&tested));
     }
+    let is_near = !near_misreadings(&errors, nominal).is_empty();
+    errors.extend(trial.registered_errors(&of_two_entries(&tested, is_near)));
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
         *shift = trial.with_best_start(*shift);

@@ -50,6 +50,7 @@ impl Misreading {
                 | Self::TableRadians { .. }
                 | Self::TableDegrees { .. }
                 | Self::Sign { .. }
+                | Self::TwistSigns { .. }
                 | Self::Length { .. }
                 | Self::Twist { .. }
                 | Self::ExchangedRows { .. }
@@ -96,6 +97,12 @@ impl Misreading {
             }
             Self::Sign { joint, field } => {
                 scale(&mut problem, joint, field, -1.0, &|_| true)?;
+                return Some(problem);
+            }
+            Self::TwistSigns { joints } => {
+                for joint in joints {
+                    scale(&mut problem, joint, JointField::Alpha, -1.0, &|_| true)?;
+                }
                 return Some(problem);
             }
             Self::Length { joint, field, power } => {

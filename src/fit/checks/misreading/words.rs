@@ -30,7 +30,7 @@ impl Misreading {
     /// Describes the misreading with its fitted `size` (an angle \[rad\], a ratio, or rad/m), if it
     /// has one. If an entry of the joint table is misread, its place in the file is added.
     pub(super) fn described(self, size: Option<f64>, problem: &Problem) -> String {
-        if let Some(place) = self.place(problem) {
+        if let Some(place) = self.place(problem).or_else(|| self.places_of_two(problem)) {
             let words = self.lengths_of_rows(problem).unwrap_or_else(|| self.to_string());
             return format!("{words} ({place})");
         }
@@ -359,6 +359,7 @@ impl Misreading {
             Self::Screw { joint, from, lead } => {
                 write!(f, "joint {joint} that also turns once per {lead} mm of joint {from}")
             }
+            Self::Zeros { .. } | Self::TwistSigns { .. } => f.write_str(&self.words_of_two()),
             _ => self.fmt_of_loads(f),
         }
     }
