@@ -5,6 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use flexcal::error::{InputError, Location};
 use flexcal::problem::Problem;
 use flexcal::report;
 use flexcal::results::{Document as _, InitResult};
@@ -77,7 +78,15 @@ fn complete_sheet(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Problem::read_with_text(&arguments.urdf)?
     } else {
         let text = text_of_table(&arguments.urdf)?;
-        (Problem::parse(&text, &arguments.urdf)?, text.into())
+        // Lines are those of the text that was made, not of the table.
+        let without_line = |error: InputError| {
+            let Location { file, key, .. } = *error.location;
+            InputError {
+                location: Box::new(Location { file, line: None, key, excerpt: None }),
+                ..error
+            }
+        };
+        (Problem::parse(&text, &arguments.urdf).map_err(without_line)?, text.into())
     };
     let description = complete(&problem, &text)?;
     let flags = &arguments.flags;

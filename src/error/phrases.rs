@@ -203,7 +203,8 @@ const MAX_OFF_HOUR: f64 = 2e-3;
 pub(super) fn clock_offset_remedy(offset: Option<&[String; 2]>) -> String {
     offset.map_or_else(String::new, |[offset, tolerance]| {
         let hours = offset.parse::<f64>().map_or(0.0, |seconds| seconds / 3600.0);
-        let is_zone = hours.abs() > 0.5 && (hours - hours.round()).abs() < MAX_OFF_HOUR;
+        let is_zone =
+            (0.5..=14.1).contains(&hours.abs()) && (hours - hours.round()).abs() < MAX_OFF_HOUR;
         let zone = if is_zone { " (by whole hours, as for summer time or UTC)" } else { "" };
         format!(
             "; with the clock of the joint table moved by {offset} s the rows have partners: the \

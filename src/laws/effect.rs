@@ -275,12 +275,6 @@ impl Effect {
         }
     }
 
-    /// Returns true if the effect begins at a time, such as a move of the station.
-    pub(crate) fn begins_at_a_time(&self) -> bool {
-        let declared = self.declaration();
-        ["at_time_s", "step(t -", "step(time -"].iter().any(|words| declared.contains(words))
-    }
-
     /// Returns the description of the effect. If times were not measured, it refers to row numbers,
     /// counted from 1, instead. `slides` is true for each prismatic joint, so that the period of a
     /// wave is a length there and an angle elsewhere.

@@ -96,7 +96,9 @@ impl Numbering {
         let Some((joint, unit)) = self.joint(number).and_then(|of| Some((of, unit(&of)?))) else {
             return Some(Ok(Meaning::Ignored(joint_ignored(problem, number))));
         };
-        let per_second = suffix.and_then(|suffix| unit.suffix(suffix.strip_suffix("_per_s")?));
+        // "qd" is also written for desired angles.
+        let of_second = suffix?.strip_suffix("_per_s")?;
+        let per_second = unit.suffix(of_second);
         Some(match per_second {
             Some(suffix) => Ok(Meaning::Read(Role::Velocity(joint), suffix.to_si)),
             None => Err(InputErrorKind::NeedsUnit {

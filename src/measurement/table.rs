@@ -65,6 +65,12 @@ pub(super) struct Table {
     last_cells: LastCells,
 }
 
+/// Returns true if a digit, a comma and a digit follow each other in a text.
+fn has_decimal_commas(text: &[u8]) -> bool {
+    let is_decimal = |of: &[u8]| of[0].is_ascii_digit() && of[1] == b',' && of[2].is_ascii_digit();
+    text.windows(3).any(is_decimal)
+}
+
 impl Table {
     /// Opens a file with the given `dialect` and reads its header; `missing` makes the error if the
     /// file does not exist.
@@ -95,7 +101,9 @@ impl Table {
         }
         let layout = Layout::detect(&beginning, dialect);
         let date_order = match DateOrder::of(&beginning) {
-            DateOrder::Unknown if dialect.decimal_comma => DateOrder::LikelyDayFirst,
+            DateOrder::Unknown if layout.byte() != b',' && has_decimal_commas(&beginning) => {
+                DateOrder::LikelyDayFirst
+            }
             order => order,
         };
         let start: Arc<[u8]> = beginning.into();

@@ -50,13 +50,18 @@ pub enum JoinRule {
     },
 }
 
+/// Largest offset of two clocks that is taken without being declared \[s\]: zones differ by less than
+/// a day, and tables of different days are not of one measurement.
+const MAX_FOUND_OFFSET: f64 = 86_400.0;
+
 impl JoinRule {
     /// Returns the rule with the offset of the clocks that an error states, and with its assignment of
     /// a larger tolerance unless that is empty; `None` for rows that are not joined by time.
     pub(crate) fn moved_to(self, [offset, tolerance]: &[String; 2]) -> Option<Self> {
         let Self::Time { tolerance: declared, .. } = self else { return None };
         let stated = tolerance.rsplit(' ').next().and_then(|number| number.parse().ok());
-        Some(Self::Time { offset: offset.parse().ok()?, tolerance: stated.unwrap_or(declared) })
+        let offset = offset.parse().ok().filter(|offset: &f64| offset.abs() < MAX_FOUND_OFFSET)?;
+        Some(Self::Time { offset, tolerance: stated.unwrap_or(declared) })
     }
 }
 

@@ -45,7 +45,8 @@ struct Column {
 pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
     let document = Document::read(file, UrdfErrorKind::Missing.into())?;
     let text = document.text.trim_start_matches('\u{feff}');
-    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let is_header = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
+    let first = text.lines().find(is_header).unwrap_or_default();
     let delimiter = [b';', b'\t', b','].into_iter().find(|&byte| first.as_bytes().contains(&byte));
     let delimiter = delimiter.unwrap_or(b',');
     let mut reader = ReaderBuilder::new()
@@ -79,10 +80,12 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
     for record in reader.records() {
         let record = record.map_err(|error| bad(&error))?;
         let line = line(record.position());
-        if record.iter().all(str::is_empty) {
+        let is_end =
+            |cell: &str| ["base", "tool", "tcp", "flange"].contains(&&*cell.to_lowercase());
+        if record.iter().all(str::is_empty) || record.get(0).is_some_and(is_end) {
             continue;
         }
-        let mut entries = Vec::new();
+        let (mut entries, mut variable) = (Vec::new(), None);
         for column in &columns {
             let cell = record.get(column.place).unwrap_or_default();
             let unreadable = || {
@@ -92,13 +95,19 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
             let comma = if delimiter == b',' { ',' } else { '.' };
             let cell = cell.replace(',', &comma.to_string());
             let (value, is_variable) = number(&cell, column.unit).ok_or_else(unreadable)?;
-            if is_variable && column.key == "d" {
-                entries.push("kind = \"prismatic\"".to_owned());
+            if is_variable {
+                let is_one = variable.replace(column.key).is_none();
+                if !is_one || !["theta", "d"].contains(&column.key) {
+                    return Err(unreadable());
+                }
             }
             let is_limit = ["min", "max"].contains(&column.key);
             if !cell.is_empty() && (value != 0.0 || is_limit) {
                 entries.push(format!("{}_{} = {value}", column.key, column.unit));
             }
+        }
+        if variable == Some("d") {
+            entries.push("kind = \"prismatic\"".to_owned());
         }
         let _ = writeln!(out, "  {{ {} }},", entries.join(", "));
     }
@@ -126,6 +135,9 @@ fn columns(
             _ => None,
         };
         let is_right = |unit: &&str| units.is_none_or(|units| units.contains(unit));
+        if units.is_none() && unit.is_none() {
+            continue;
+        }
         let unit = unit.filter(is_right).ok_or_else(|| {
             let write = units.unwrap_or(ANGLES).map(|unit| format!("{key}_{unit}")).join(" or ");
             at(name).error(UrdfErrorKind::SheetUnit { write })
@@ -144,11 +156,14 @@ fn columns(
 /// and tells whether it names the coordinate of the joint; `None` for other texts.
 fn number(cell: &str, unit: &str) -> Option<(f64, bool)> {
     let text: String = cell.replace('−', "-").replace("pi", "π").to_lowercase();
+    if unit == "rad" && text.contains('°') {
+        return None;
+    }
     let text: String = text.chars().filter(|c| !" °*".contains(*c)).collect();
     let is_name = |c: char| c.is_alphabetic() && c != 'π';
     let Some(start) = text.find(is_name) else { return Some((constant(&text, unit)?, false)) };
-    if text.parse::<f64>().is_ok() {
-        return Some((text.parse().ok()?, false));
+    if let Ok(number) = text.parse::<f64>() {
+        return number.is_finite().then_some((number, false));
     }
     let (before, name) = text.split_at(start);
     let word: String = name.chars().take_while(|&c| is_name(c)).collect();
@@ -156,14 +171,15 @@ fn number(cell: &str, unit: &str) -> Option<(f64, bool)> {
         return None;
     }
     let end = name.find(['+', '-']).unwrap_or(name.len());
-    let before = before.strip_suffix('+').unwrap_or(before);
+    let before = if before.is_empty() { before } else { before.strip_suffix('+')? };
     Some((constant(before, unit)? + constant(name.get(end..)?, unit)?, true))
 }
 
 /// Parses a number or a multiple of π \[rad\] in the `unit` of a column; 0 for an empty text.
 fn constant(text: &str, unit: &str) -> Option<f64> {
     let Some((factor, divisor)) = text.split_once('π') else {
-        return if text.is_empty() { Some(0.0) } else { text.parse().ok() };
+        let number = if text.is_empty() { Some(0.0) } else { text.parse().ok() };
+        return number.filter(|number: &f64| number.is_finite());
     };
     let factor = match factor {
         "" | "+" => 1.0,
@@ -196,7 +212,7 @@ mod tests {
             let (read, is_variable) = number(cell, "deg").unwrap();
             assert!((read - value.0).abs() < 1e-12 && is_variable == value.1, "{cell}: {read}");
         }
-        for cell in ["1.2.3", "--3", "π2", "q2*3 + x", "x2"] {
+        for cell in ["1.2.3", "--3", "π2", "q2*3 + x", "x2", "2*q2", "nan"] {
             assert_eq!(number(cell, "deg"), None, "{cell}");
         }
     }

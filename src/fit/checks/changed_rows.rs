@@ -41,6 +41,9 @@ const MAX_SIZE: [usize; 2] = [4000, 150];
 const MIN_NOISE_PROBABILITY: f64 = 1e-3;
 /// Largest number of rows that a text lists.
 const MAX_LISTED: usize = 4;
+/// Smallest mean decrease of χ² of a row with another target, relative to what is left in a row, at
+/// which two places of a target are told apart.
+const MIN_CLEARNESS: f64 = 100.0;
 /// Largest share of the changed rows on the wrong side of a limit of a column that tells them from the
 /// others.
 const MAX_MIXED_SHARE: f64 = 0.1;
@@ -202,7 +205,10 @@ fn mixed_targets(fit: &CheckedFit, linear: &Linear, places: &Places) -> Option<F
         let step = Step { place, first: 0, cost, change, columns: columns.len() };
         // Chance chooses from all divisions of the rows.
         let tries = 2_f64.powi(i32::try_from(fit.fitting.split.identification.len()).ok()?);
-        if !is_beyond_chance(linear, &step, tries) || is_told_by_column(fit, &rows) {
+        let count = fit.fitting.split.identification.len() as f64;
+        // Each row has to show by itself where its target sits.
+        let is_clear = (linear.cost - cost) / rows.len() as f64 >= MIN_CLEARNESS * cost / count;
+        if !(is_clear && is_beyond_chance(linear, &step, tries)) || is_told_by_column(fit, &rows) {
             return None;
         }
         let identification = &fit.fitting.split.identification;

@@ -332,15 +332,9 @@ impl Finding {
     }
 
     /// Replaces a remedy that suggests `flexcal loop` by one that applies after a loop; other
-    /// remedies stay. `has_onset` is true if the loop found an effect that begins at a time.
-    pub(crate) fn set_remedy_after_loop(&mut self, has_onset: bool) {
+    /// remedies stay.
+    pub(crate) fn set_remedy_after_loop(&mut self) {
         let remedy = match self.code {
-            FindingCode::HeldOutOutliers if has_onset => {
-                "the change that was found may begin earlier or later, between the fitted rows beside \
-                 its time: correct the time; otherwise numbers or signs are mistyped there"
-                    .clone_into(&mut self.remedy);
-                return;
-            }
             FindingCode::HeldOutBeyondPrediction => {
                 "measure poses like the held-out ones and fit them too"
             }
@@ -350,7 +344,8 @@ impl Finding {
             }
             FindingCode::RowsSetAside => "check these rows",
             FindingCode::HeldOutOutliers => {
-                "numbers or signs are mistyped there, or what the loop found is not the right cause"
+                "numbers or signs are mistyped there, or what the loop found begins at another time \
+                 or is not the right cause"
             }
             _ => return,
         };

@@ -149,11 +149,15 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
         sets.iter().filter_map(fitted).filter(is_better).collect()
     };
     let mut freed = explaining(&single, MIN_EXPLAINED_SHARES[0]);
-    if freed.is_empty() {
-        freed = explaining(&pairs, MIN_EXPLAINED_SHARES[1]);
-    }
-    if freed.is_empty() && may_move {
+    let is_none = freed.is_empty();
+    if is_none && may_move {
         freed = explaining(&[vec![BASE.to_owned()]], MIN_SHARE_OF_BASE);
+    }
+    // A base that moved explains as much as two parameters of joint 1, and is likelier.
+    let is_whole = |freed: &Freed| freed.trial.rms.powi(2) <= limit(MIN_EXPLAINED_SHARES[1]);
+    if is_none && !freed.iter().any(is_whole) {
+        let of_pairs = explaining(&pairs, MIN_EXPLAINED_SHARES[1]);
+        freed = if of_pairs.is_empty() { freed } else { of_pairs };
     }
     freed.sort_by(|a, b| a.trial.left_out.total_cmp(&b.trial.left_out));
     let best = freed.first()?;

@@ -36,9 +36,11 @@ const MAX_LEFT_BY_READING: f64 = 0.05;
 /// hardly decreases it is small.
 const FAR_BELOW_DECLARED: f64 = 0.5;
 /// Smallest ratio by which free intrinsics decrease the reduced χ² below [`FAR_BELOW_DECLARED`], or
-/// that within views where the declared noise does not explain what they leave: a smaller decrease
-/// may come from the shape of the marker.
+/// that within views of a bent marker: a smaller decrease may come from its shape.
 const MIN_DECREASE: f64 = 1.1;
+/// Smallest [`Within::shape`] of a marker that is bent. That of a flat one exceeds it by chance only
+/// with very few points.
+const MIN_SHAPE_RATIO: f64 = 4.0;
 /// Smallest number of degrees of freedom within views that determines the noise of pixels: its
 /// relative standard error is then √(2/200) = 10 %.
 const MIN_NOISE_FREEDOM: f64 = 200.0;
@@ -86,18 +88,18 @@ pub(in crate::fit) fn lens_finding(
     let Freed { problem: freed, fitted: other, reduced_chi2: after, freedom, gain, chance } =
         Freed::new((problem, found), &fixed, &fit)?;
     let of_views = noise_within_views(&freed, data, &other);
-    let (noise, within) = of_views.unwrap_or((1.0, 0.0));
+    let Within { noise, freedom: within, shape } = of_views.unwrap_or_default();
     let by_chance = REMAINING_SIGMAS * noise * (2.0 * (freedom - within).max(0.0)).sqrt();
     let remaining = (after - noise) * freedom - by_chance;
-    let before_within = noise_within_views(problem, data, found).map(|(noise, _)| noise);
-    let is_bent = noise > 1.0 + REMAINING_SIGMAS * (2.0 / within.max(1.0)).sqrt()
+    let before_within = noise_within_views(problem, data, found).map(|within| within.noise);
+    let is_bent = shape > MIN_SHAPE_RATIO
         && before_within.is_some_and(|before| before < MIN_DECREASE * noise);
     let explains = chance <= MAX_CHANCE_PROBABILITY
         && gain > MIN_GAIN_RATIO * remaining
         && (before > FAR_BELOW_DECLARED || before > MIN_DECREASE * after)
         && !is_bent;
-    let shown = before_within.zip(of_views).filter(|&(before, (after, freedom))| {
-        is_shown_within_views((before, after), freedom, fixed.len() as f64)
+    let shown = before_within.zip(of_views).filter(|&(before, of)| {
+        is_shown_within_views((before, of.noise), of.freedom, fixed.len() as f64)
             && (before > FAR_BELOW_DECLARED || before > MIN_DECREASE * after)
     });
     if !explains && shown.is_none() {
@@ -116,7 +118,7 @@ pub(in crate::fit) fn lens_finding(
     let names: Vec<&str> = off.iter().map(|estimate| estimate.name.as_str()).collect();
     let words = words.collect::<Vec<_>>().join(", ");
     let text = match shown.filter(|_| !explains) {
-        Some((before, (after, _))) => format!(
+        Some((before, Within { noise: after, .. })) => format!(
             "the intrinsics are not as declared: with {words} the reduced χ² within the views, \
              where no error of the arm acts, falls from {before:.3} to {after:.3}; something beyond \
              the views errs as well"
@@ -287,18 +289,32 @@ fn is_shown_within_views((before, after): (f64, f64), freedom: f64, count: f64) 
     chance <= MAX_CHANCE_PROBABILITY && gain > MIN_GAIN_RATIO * left
 }
 
-/// Returns the noise variance of pixels within views, relative to the declared one, and the degrees
-/// of freedom from which it is estimated; `None` if these are too few.
+/// Residual of pixels within views, in which no error of the arm acts.
+#[derive(Debug, Clone, Copy)]
+struct Within {
+    /// Variance, relative to the declared noise.
+    noise: f64,
+    /// Degrees of freedom from which it is estimated.
+    freedom: f64,
+    /// Mean decrease of χ² by a shift of each point along the normal of its marker, the same in all
+    /// views, relative to `noise`: 1 for a flat marker, more for a bent one.
+    shape: f64,
+}
+
+/// Values without an estimate: those of the declared noise.
+impl Default for Within {
+    fn default() -> Self {
+        Self { noise: 1.0, freedom: 0.0, shape: 1.0 }
+    }
+}
+
+/// Returns the residual of pixels within views; `None` if it has too few degrees of freedom.
 ///
 /// Errors of the arm only move the camera relative to the marker. In each view, the residuals are
 /// therefore projected onto the complement of the six motions of the camera. What remains is noise
 /// if lens and marker are as modelled. With the derivatives M of the pixels of a view with respect
 /// to these motions, χ² = r·r − (Mᵀr)ᵀ (MᵀM)⁻¹ Mᵀr.
-fn noise_within_views(
-    problem: &Problem,
-    data: &Dataset,
-    found: &Identification,
-) -> Option<(f64, f64)> {
+fn noise_within_views(problem: &Problem, data: &Dataset, found: &Identification) -> Option<Within> {
     let Dataset { measurements, split } = data;
     let placement = Placement::of(measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets).ok()?;
@@ -307,9 +323,11 @@ fn noise_within_views(
     let fixtures = model.fixtures(found.x.as_slice());
     let carriers = model.carrier_frames(&poses, found.x.as_slice());
     let (mut chi2, mut freedom) = (0.0, 0.0);
+    // For each marker and point, Σ s·r and Σ s² of the slopes s along the normal.
+    let mut shapes: BTreeMap<(usize, [u64; 3]), [f64; 2]> = BTreeMap::new();
     for view in views(measurements, &split.identification) {
         let (mut normal, mut right, mut square) = (Matrix6::zeros(), Vector6::zeros(), 0.0);
-        let mut numbers = 0;
+        let (mut numbers, mut rows) = (0, Vec::new());
         for (pose, carriers) in view.into_iter().map(|place| (&poses[place], carriers[place])) {
             let ([Some(camera), Some(marker)], Some(carriers)) =
                 (pose.observation.fixtures(), carriers)
@@ -327,6 +345,10 @@ fn noise_within_views(
                 let motion =
                     slopes.by_fixtures[0].fixed_view::<1, 6>(axis, 0).transpose() / pose.sigma;
                 let residual = (pose.measured[axis] - slopes.value[axis]) / pose.sigma;
+                let normal_axis = fixtures[marker].frame().axes[2];
+                let along = slopes.by_fixtures[1].fixed_view::<1, 3>(axis, 0) * normal_axis;
+                let point = scene.point.map(f64::to_bits);
+                rows.push((motion, residual, along[0] / pose.sigma, (marker, point.into())));
                 normal += motion * motion.transpose();
                 right += motion * residual;
                 square += residual * residual;
@@ -336,9 +358,19 @@ fn noise_within_views(
         if numbers > 6
             && let Some(factor) = normal.cholesky()
         {
-            chi2 += square - right.dot(&factor.solve(&right));
+            let moved = factor.solve(&right);
+            chi2 += square - right.dot(&moved);
             freedom += f64::from(numbers - 6);
+            for (motion, residual, along, point) in rows {
+                let [product, squares] = shapes.entry(point).or_default();
+                *product += along * (residual - motion.dot(&moved));
+                *squares += along * along;
+            }
         }
     }
-    (freedom >= MIN_NOISE_FREEDOM && chi2.is_finite()).then(|| (chi2 / freedom, freedom))
+    let gains = shapes.values().filter(|[_, squares]| *squares > 0.0);
+    let gains: Vec<f64> = gains.map(|[product, squares]| product * product / squares).collect();
+    let noise = chi2 / freedom;
+    let shape = gains.iter().sum::<f64>() / gains.len().max(1) as f64 / noise;
+    (freedom >= MIN_NOISE_FREEDOM && chi2.is_finite()).then_some(Within { noise, freedom, shape })
 }

@@ -242,8 +242,7 @@ pub fn close_by(
     let mut after = fitted.found;
     after.findings.splice(0..0, orientations.into_iter().chain(gravity));
     if !interrupted {
-        let has_onset = effects.iter().any(|found| found.effect.begins_at_a_time());
-        after.findings.iter_mut().for_each(|finding| finding.set_remedy_after_loop(has_onset));
+        after.findings.iter_mut().for_each(Finding::set_remedy_after_loop);
     }
     Ok(ClosedLoop {
         verdict,

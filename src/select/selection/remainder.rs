@@ -1,6 +1,6 @@
 //! Remainder in addition to the effects that the loop found.
 
-use crate::fit::{FindingCode, IdentifyError};
+use crate::fit::{Finding, FindingCode, IdentifyError};
 use crate::measurement::Dataset;
 use crate::problem::Problem;
 use crate::remainder::{self, Fitted};
@@ -80,8 +80,7 @@ impl ClosedLoop {
         if unexplained.is_empty() {
             unexplained.extend(unexplained::unlocated(&residual_tests));
         }
-        let has_onset = effects.iter().any(|found| found.effect.begins_at_a_time());
-        found.findings.iter_mut().for_each(|finding| finding.set_remedy_after_loop(has_onset));
+        found.findings.iter_mut().for_each(Finding::set_remedy_after_loop);
         let has_gear = effects.iter().any(|found| is_periodic_of_many_orders(&found.effect));
         Self {
             verdict: Verdict::Unexplained,
