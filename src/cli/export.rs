@@ -292,10 +292,11 @@ fn check_poses(
     };
     for fixture in problem.fixtures.iter().filter(|fixture| is_written(fixture)) {
         let (kind, name) = (fixture.kind.word(), &fixture.name);
-        let names = ["x", "y", "z", "rx", "ry", "rz"].map(|axis| format!("{kind}[{name}].{axis}"));
         // No view shows how a marker of one point is turned, nor of two about their line.
         let count = if kind == "marker" && fixture.points.len() < 3 { 3 } else { 6 };
-        let open = estimates.undetermined(&names[..count]);
+        let axes = ["x", "y", "z", "rx", "ry", "rz"].into_iter().take(count);
+        let names: Vec<String> = axes.map(|axis| format!("{kind}[{name}].{axis}")).collect();
+        let open = estimates.undetermined(&names);
         if !open.is_empty() {
             let axes = open.iter().filter_map(|name| name.rsplit('.').next());
             return Err(code::ExportError::PoseOpen {

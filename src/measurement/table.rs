@@ -67,8 +67,8 @@ pub(super) struct Table {
 
 /// Returns true if a digit, a comma and a digit follow each other in a text.
 fn has_decimal_commas(text: &[u8]) -> bool {
-    let is_decimal = |of: &[u8]| of[0].is_ascii_digit() && of[1] == b',' && of[2].is_ascii_digit();
-    text.windows(3).any(is_decimal)
+    let is_decimal = |of: &[u8; 3]| matches!(of, [b'0'..=b'9', b',', b'0'..=b'9']);
+    text.array_windows().any(is_decimal)
 }
 
 impl Table {

@@ -5,7 +5,6 @@ use nalgebra::Vector3;
 /// Regressors of effects that a data set records, with their ranges. They decide which effects it
 /// can show.
 #[derive(Debug, Clone, PartialEq, Default)]
-#[expect(clippy::struct_excessive_bools, reason = "each states one kind of data")]
 pub struct DataCoverage {
     /// Reason why temperature effects cannot be shown. `None` if the temperature is recorded and
     /// varies, and the problem declares its reference temperature.
