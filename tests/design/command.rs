@@ -87,8 +87,8 @@ fn measured_poses_that_are_held_out_do_not_count() {
     // The forecast is that of the fitted rows alone.
     let rows = std::fs::read_to_string(path("tests/cases/a-none.csv")).unwrap();
     let is_fitted = |line: &&str| !line.contains("validation");
-    let fitted: String = rows.lines().filter(is_fitted).map(|line| format!("{line}\n")).collect();
-    folder.write("fitted.csv", fitted);
+    let fitted: Vec<&str> = rows.lines().filter(is_fitted).collect();
+    folder.write("fitted.csv", fitted.join("\n") + "\n");
     let file = folder.path("fitted.csv");
     let alone = flexcal(&folder, &format!("{plan} --data {} --json", file.display())).json();
     assert_eq!(result["parameters"], alone["parameters"]);

@@ -9,6 +9,7 @@ use flexcal::report::estimate_text;
 use flexcal::results::{Document as _, IdentificationResult};
 
 use crate::bench::{Bench, whole, with_zero};
+use crate::common::arms::parse;
 use crate::common::program::{Folder, assert_contains, in_one_line};
 
 /// Poses of a full calibration.
@@ -55,6 +56,24 @@ fn a_moved_zero_is_named_and_fitted() {
     assert_eq!(finding.word("cause"), Some("zero of joint 2"), "{finding}");
     println!("full {full:.2e}, prior {prior:.2e}");
     assert!(prior < 1.6 * full, "{full} {prior}");
+}
+
+#[test]
+fn the_test_of_new_rows_says_that_it_leaves_bounds_out() {
+    let mut bench = Bench::new();
+    let (wide, narrow) = ("{ sigma_mm = 2.0 }", "{ free = true, min_mm = -0.001, max_mm = 0.001 }");
+    let text = include_str!("arm.toml");
+    for problem in [
+        text,
+        &text.replacen(&format!("\"base.x\" = {wide}"), &format!("\"base.x\" = {narrow}"), 1),
+    ] {
+        bench.problem = parse(problem);
+        let (.., found) = again(&bench, 3, 8, 0.0);
+        let is_bound = found.estimates.iter().any(|estimate| estimate.at_bound.is_some());
+        assert_eq!(is_bound, problem != text);
+        let words = in_one_line(&estimate_text(&bench.problem, &found, None));
+        assert_eq!(words.contains("against it (without bounds and constraints)"), is_bound);
+    }
 }
 
 #[test]

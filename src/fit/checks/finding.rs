@@ -329,10 +329,10 @@ impl Finding {
     pub(crate) fn set_remedy_after_loop(&mut self, has_onset: bool) {
         let remedy = match self.code {
             FindingCode::HeldOutOutliers if has_onset => {
-                self.remedy = "the change that was found may begin earlier or later, between the \
-                               fitted rows beside its time: correct the time; otherwise numbers or \
-                               signs are mistyped there"
-                    .to_owned();
+                let remedy = "the change that was found may begin earlier or later, between the \
+                              fitted rows beside its time: correct the time; otherwise numbers \
+                              or signs are mistyped there";
+                self.remedy = String::from(remedy);
                 return;
             }
             FindingCode::HeldOutBeyondPrediction => {
