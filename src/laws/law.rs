@@ -355,7 +355,10 @@ impl Law {
     pub(super) fn describe(&self) -> String {
         let (place, formulas) = (self.place_in_words(), self.formulas());
         let errs = match formulas.split_last() {
-            Some((last, [])) => format!("{place} errs by a multiple of {last}"),
+            Some((last, [])) => {
+                let like = if last.contains("/sqrt(1 + ") { ", as a gas spring does" } else { "" };
+                format!("{place} errs by a multiple of {last}{like}")
+            }
             Some((last, rest)) => {
                 format!("{place} errs by multiples of {} and {last}", rest.join(", "))
             }

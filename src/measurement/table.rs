@@ -67,8 +67,7 @@ pub(super) struct Table {
 
 /// Returns true if a digit, a comma and a digit follow each other in a text.
 fn has_decimal_commas(text: &[u8]) -> bool {
-    let is_decimal = |of: &[u8; 3]| matches!(of, [b'0'..=b'9', b',', b'0'..=b'9']);
-    text.array_windows().any(is_decimal)
+    text.windows(3).any(|of| matches!(of, [b'0'..=b'9', b',', b'0'..=b'9']))
 }
 
 impl Table {

@@ -174,7 +174,7 @@ fn accuracy_blocks<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
             bound.coverage * bound.rows as f64,
             bound.rows,
             number(bound.coverage * 100.0, 1),
-            chance_of_bound(Some(&bound.test), HELD_OUT),
+            chance_of_bound(Some(&bound.test), HELD_OUT, bound.test.of == bound.rows),
         ))
     });
     let blocks = [Block::Table(table), Block::Text(SCOPE_NOTE.to_owned())];

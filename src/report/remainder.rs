@@ -264,21 +264,25 @@ fn contradicted_bound(test: Option<&BoundTest>, noun: &str) -> String {
 
 /// States how likely chance alone leaves so few configurations within their bounds, if these are
 /// fewer than expected; otherwise empty. `noun` names the configurations. The sentence begins with
-/// a space.
-pub(super) fn chance_of_bound(test: Option<&BoundTest>, noun: &str) -> String {
+/// a space. `is_said` is true if the text before it says how many lie within their bounds.
+pub(super) fn chance_of_bound(test: Option<&BoundTest>, noun: &str, is_said: bool) -> String {
     let contradicted = contradicted_bound(test, noun);
     if !contradicted.is_empty() {
         return contradicted;
     }
     match test.filter(|test| test.beyond() as f64 > test.expected_beyond()) {
-        Some(test) => format!(
-            " {} of {} {noun} lie within their bounds; as few or fewer do so by chance in {} % \
-             of cases. The bounds rest on {}.",
-            test.within,
-            test.of,
-            two_digits(100.0 * test.chance(), 2),
-            counted(test.learned_from, "fitted configuration")
-        ),
+        Some(test) => {
+            let few = if is_said {
+                " As few".to_owned()
+            } else {
+                format!(" {} of {} {noun} lie within their bounds; as few", test.within, test.of)
+            };
+            format!(
+                "{few} or fewer do so by chance in {} % of cases. The bounds rest on {}.",
+                two_digits(100.0 * test.chance(), 2),
+                counted(test.learned_from, "fitted configuration")
+            )
+        }
         None => String::new(),
     }
 }
@@ -365,7 +369,7 @@ pub(super) fn bound_sentence(
         };
     }
     let test = compared.and_then(|compared| compared.test);
-    words + &chance_of_bound(test, "configurations that were not fitted")
+    words + &chance_of_bound(test, "configurations that were not fitted", false)
 }
 
 /// States that rows contradict an estimate that was fitted to none of them: their error, the

@@ -9,6 +9,7 @@ use flexcal::report::estimate_text;
 use flexcal::results::{Document as _, IdentificationResult};
 
 use crate::bench::{Bench, whole, with_zero};
+use crate::common::arms::parse;
 use crate::common::program::{Folder, assert_contains, in_one_line};
 
 /// Poses of a full calibration.
@@ -75,6 +76,24 @@ fn two_moved_zeros_are_named_as_by_the_watch() {
         for cause in [finding.word("cause").unwrap(), &watched.causes[0].label] {
             assert!(named.iter().all(|zero| cause.contains(zero.as_str())), "{zeros:?}: {cause}");
         }
+    }
+}
+
+#[test]
+fn the_test_of_new_rows_says_that_it_leaves_bounds_out() {
+    let mut bench = Bench::new();
+    let (wide, narrow) = ("{ sigma_mm = 2.0 }", "{ free = true, min_mm = -0.001, max_mm = 0.001 }");
+    let text = include_str!("arm.toml");
+    for problem in [
+        text,
+        &text.replacen(&format!("\"base.x\" = {wide}"), &format!("\"base.x\" = {narrow}"), 1),
+    ] {
+        bench.problem = parse(problem);
+        let (.., found) = again(&bench, 3, 8, 0.0);
+        let is_bound = found.estimates.iter().any(|estimate| estimate.at_bound.is_some());
+        assert_eq!(is_bound, problem != text);
+        let words = in_one_line(&estimate_text(&bench.problem, &found, None));
+        assert_eq!(words.contains("against it (without bounds and constraints)"), is_bound);
     }
 }
 

@@ -183,8 +183,8 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
         }
     };
     let text = format!(
-        "the positions do not follow the column {name}: with the coordinate of joint {} found from each \
-         position, the nominal arm misses them by {} instead of {}; {what}",
+        "the positions do not follow the column {name}: with joint {} found from each position, the \
+         nominal arm misses by {} instead of {}; {what}",
         joint + 1,
         format_error("position", after, 1),
         format_error("position", fit.registered.identification.rms.norm, 1)

@@ -117,14 +117,11 @@ impl Check for ReadAsMeant {
                      priors"
                 )
             } else {
-                format!(
-                    "{rest}; as read it is {as_read} (the smaller error of nominal \
-                     and fitted arm)"
-                )
+                format!("{rest} instead of {as_read} (the better of nominal and fitted arm)")
             };
             let text = format!(
-                "the measurements fit if they are read in another way: with {named}, the rms \
-                 error would be {instead}"
+                "the measurements fit if read in another way: with {named}, the rms error would be \
+                 {instead}"
             );
             return vec![found(text)];
         }

@@ -202,6 +202,8 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         let is_consequence = |found: &&mut Finding| {
             CONSEQUENCES.contains(&found.code)
                 && (cause_text.is_none() || !OF_MISFIT.contains(&found.code))
+                || found.code == FindingCode::NominalFarOff
+                    && *mistake == FindingCode::ColumnDoubted
         };
         for finding in findings.iter_mut().filter(is_consequence) {
             *finding = finding.clone().with_remedy(remedy.clone());
