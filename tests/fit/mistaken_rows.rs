@@ -21,14 +21,16 @@ fn arm() -> (Problem, Dataset) {
 
 /// Returns the finding with a code as text.
 fn told(found: &Identification, code: FindingCode) -> String {
-    let finding = found.finding(code);
-    finding.unwrap_or_else(|| panic!("{:?}", found.findings)).to_string()
+    found.finding(code).unwrap().to_string()
 }
+
+/// Number of a row in a mistaken column, as a function of the right column.
+type Mistake = fn(usize, &[f64]) -> f64;
 
 #[test]
 fn what_the_numbers_of_a_column_are_is_named() {
     let (problem, clean) = arm();
-    let cases: [(usize, fn(usize, &[f64]) -> f64, &str); 4] = [
+    let cases: [(usize, Mistake, &str); 4] = [
         (2, |row, q| q[row.saturating_sub(1)], "each of its numbers belongs to the row before"),
         (0, |row, q| q[(row + 1).min(89)], "each of its numbers belongs to the row after"),
         (1, |row, q| q[if (20..35).contains(&row) { 20 } else { row }], "it holds one number"),
