@@ -131,14 +131,23 @@ fn causes_that_the_catalogue_holds_by_now_are_named() {
 #[test]
 fn a_link_that_bends_with_the_square_of_temperature_is_no_error_of_a_joint() {
     let evidence = of("out.toml", UNKNOWN, "out-t-20-2-bending-of-a-28");
-    let is_it = |hypothesis: &Hypothesis| {
-        let law = hypothesis.effect().and_then(|effect| match effect {
-            Effect::Law(law) => Some((law.site(), law.formulas())),
-            _ => None,
-        });
-        law == Some(("A.curvature_z".to_owned(), vec!["T^2".to_owned()]))
-    };
-    assert!(evidence.probability(is_it) >= STATED, "{:?}", evidence.best());
+    let probability = probability_of_law(&evidence, "A.curvature_z", "T^2");
+    assert!(probability >= STATED, "{:?}", evidence.best());
+}
+
+/// The link before joint 4 would displace the target nearly alike if it bent by a function of q4.
+#[test]
+fn a_law_of_a_joint_is_tried_where_a_function_at_a_link_fits() {
+    let evidence = of("out.toml", "", "joint-3-errs-by-q4-2-28");
+    assert!(probability_of_law(&evidence, "joint3", "q4^2") > 0.5, "{:?}", evidence.best());
+}
+
+/// Returns the probability that a law with this formula alone acts at this site.
+fn probability_of_law(evidence: &Evidence, site: &str, formula: &str) -> f64 {
+    evidence.probability(|hypothesis| {
+        matches!(hypothesis.effect(), Some(Effect::Law(law))
+            if law.site() == site && law.formulas() == [formula])
+    })
 }
 
 #[test]

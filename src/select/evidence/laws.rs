@@ -28,6 +28,10 @@ use crate::select::grammar::{
 /// Smallest probability of a set at which laws are searched in place of its members: at the
 /// coordinate of a joint, and elsewhere.
 const MIN_SET_PROBABILITIES: [f64; 2] = [0.1, 0.2];
+/// Smallest probability, at a joint, of the sets in which that joint takes the place of a function
+/// without a law at another site, such as a link, at which laws are searched there. A law has fewer
+/// coefficients than a function, so it may be far more probable than the function at either site.
+const MIN_REPLACING_PROBABILITY: f64 = 1e-4;
 /// Maximum number of pairs of a joint and a set, the most probable ones, for which laws are
 /// searched.
 const MAX_SEARCHED: usize = 2;
@@ -198,10 +202,18 @@ fn places(
             *probability_of_rest.entry((joint, other_members)).or_default() += set.probability;
         }
     }
-    let mut found: Vec<((usize, Vec<usize>), f64)> = probability_of_rest
-        .into_iter()
-        .filter(|(_, probability)| *probability > MIN_SET_PROBABILITIES[0])
-        .collect();
+    let is_smooth =
+        |member: &usize| hypotheses.candidates[*member].hypothesis.kind == HypothesisKind::Smooth;
+    let is_elsewhere = |member: &usize| is_smooth(member) && of(*member).is_none();
+    let best = evaluated_sets.first();
+    let may_replace = best.is_some_and(|set| set.members.iter().any(is_elsewhere));
+    let is_searched = |((_, rest), probability): &((usize, Vec<usize>), f64)| {
+        let replaces = may_replace && !rest.iter().any(is_smooth);
+        let least = if replaces { MIN_REPLACING_PROBABILITY } else { MIN_SET_PROBABILITIES[0] };
+        *probability > least
+    };
+    let mut found: Vec<((usize, Vec<usize>), f64)> =
+        probability_of_rest.into_iter().filter(is_searched).collect();
     found.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     found.truncate(MAX_SEARCHED);
     let place = |(joint, rest): (usize, Vec<usize>)| {

@@ -153,7 +153,7 @@ impl Evidence {
 
     /// Returns effects that may replace `effect` in a model with the effects `held`, best first.
     /// Each has the probability of the sets that contain it instead of `effect`, at least
-    /// `min_ratio` times that of the sets with `effect`.
+    /// `min_ratio` times that of the sets with `effect`, or with the best of them if more.
     pub fn alternatives(
         &self,
         effect: &Effect,
@@ -207,7 +207,8 @@ impl Evidence {
         if with == 0.0 {
             return Vec::new();
         }
-        instead.retain(|(_, probability)| *probability >= with * min_ratio);
+        let most = instead.iter().fold(with, |most, (_, probability)| most.max(*probability));
+        instead.retain(|(_, probability)| *probability >= most * min_ratio);
         instead.sort_by(|a, b| b.1.total_cmp(&a.1));
         instead
     }
@@ -309,6 +310,17 @@ mod tests {
         let alternatives = evidence.alternatives(&drift(), &held, 0.1);
         assert_eq!(alternatives, [(shift(30.0), 0.2), (settling(), 0.1)]);
         assert_eq!(evidence.alternatives(&shift(10.0), &held, 0.1), []);
+        // An improbable effect is compared with the most probable one that may replace it.
+        let improbable = vec![
+            of(&[shift(10.0)], 0.75),
+            of(&[settling()], 0.2),
+            of(&[Effect::StationMove { at_time: 10.0 }], 0.04),
+            of(&[drift()], 0.01),
+        ];
+        let held = [drift()];
+        let evidence = Evidence { sets: improbable, ..evidence };
+        let alternatives = evidence.alternatives(&drift(), &held, 0.1);
+        assert_eq!(alternatives, [(shift(10.0), 0.75), (settling(), 0.2)]);
     }
 
     #[test]

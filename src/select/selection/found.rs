@@ -303,7 +303,8 @@ fn with_rivals(
 }
 
 /// Returns effects that may replace `effect` in a model with the effects `held`; of each family at
-/// a place, only the most probable. Each is at least `min_ratio` times as probable as `effect`.
+/// a place, only the most probable. Each is at least `min_ratio` times as probable as the most
+/// probable one of `effect` and them.
 fn alternatives(
     evidence: &Evidence,
     effect: &Effect,
