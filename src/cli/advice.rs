@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexcal::fit::{Estimate, FindingCode, Identification, SavedEstimate, Strategy};
+use flexcal::fit::{Estimate, Finding, FindingCode, Identification, SavedEstimate, Strategy};
 use flexcal::problem::{Fixture, HeldOut, PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
@@ -105,11 +105,6 @@ pub fn after_fit(
             "correct or free the intrinsics in {file} as the warning says, then flexcal identify \
              {named}"
         ),
-        None if found.has(FindingCode::HeldParameter) => {
-            format!(
-                "correct or free in {file} what the warning names, then flexcal identify {named}"
-            )
-        }
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
@@ -122,6 +117,11 @@ pub fn after_fit(
             && !found.has(FindingCode::NominalFarOff) =>
         {
             widen_prior(found, &file)
+        }
+        None if held_value(found).is_some() => {
+            format!(
+                "correct or free in {file} what the warning names, then flexcal identify {named}"
+            )
         }
         None if INPUT_MISTAKES.iter().any(|code| found.has(*code)) => format!(
             "correct the table or {file} as the warning says, then flexcal identify {named}; if \
@@ -184,6 +184,13 @@ fn widen_prior(found: &Identification, file: &str) -> String {
     )
 }
 
+/// Returns the finding on held parameters that cause most of the misfit. A base is left out, which may
+/// take away only half of it.
+pub fn held_value(found: &Identification) -> Option<&Finding> {
+    let held = found.finding(FindingCode::HeldParameter)?;
+    (!held.word("parameter")?.starts_with("base.")).then_some(held)
+}
+
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared
 /// problem to rows of `measured_poses` poses, and `results` are the files that the loop wrote.
 pub fn after_loop(
@@ -204,7 +211,7 @@ pub fn after_loop(
     if !result.trusted {
         return format!("flexcal identify {named} -v, once the input is corrected");
     }
-    if fit.has(FindingCode::HeldParameter) {
+    if held_value(fit).is_some() {
         return format!(
             "correct or free in {file} what the warning names, then flexcal loop {named}"
         );
