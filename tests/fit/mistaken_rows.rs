@@ -73,8 +73,9 @@ fn the_reading_with_which_a_block_of_rows_fits_is_named() {
     let shifted = text(&data);
     assert!(shifted.contains("belong to the joint angles of the row before"), "{shifted}");
     let mut data = clean;
-    let moved = &mut data.measurements.positions[..9];
-    moved.iter_mut().for_each(|at| *at += Vector3::new(0.4, -0.3, 0.2));
+    for at in &mut data.measurements.positions[..9] {
+        *at += Vector3::new(0.4, -0.3, 0.2);
+    }
     let moved = text(&data);
     assert!(moved.contains("they fit where the base stands elsewhere, by"), "{moved}");
 }
