@@ -43,7 +43,7 @@ fn what_the_numbers_of_a_column_are_is_named() {
         (
             3,
             |row, q| if row < 45 { q[row] } else { q[row] + 1.5 },
-            "its numbers are too large by 86",
+            "its numbers are too large by 8",
         ),
     ];
     for (joint, number, words) in cases {
