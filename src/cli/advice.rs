@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexcal::fit::{Estimate, FindingCode, Identification, SavedEstimate, Strategy};
+use flexcal::fit::{Estimate, Finding, FindingCode, Identification, SavedEstimate, Strategy};
 use flexcal::problem::{Fixture, HeldOut, PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
@@ -102,11 +102,6 @@ pub fn after_fit(
         }
         None if found.has(FindingCode::Misread) => correct(),
         None if let Some(what) = camera_advice(found, &file) => as_warned(&what),
-        None if found.has(FindingCode::HeldParameter) => {
-            format!(
-                "correct or free in {file} what the warning names, then flexcal identify {named}"
-            )
-        }
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
@@ -119,6 +114,11 @@ pub fn after_fit(
             && !found.has(FindingCode::NominalFarOff) =>
         {
             widen_prior(found, &file)
+        }
+        None if held_value(found).is_some() => {
+            format!(
+                "correct or free in {file} what the warning names, then flexcal identify {named}"
+            )
         }
         None if INPUT_MISTAKES.iter().any(|code| found.has(*code)) => format!(
             "correct the table or {file} as the warning says, then flexcal identify {named}; if \
@@ -181,6 +181,25 @@ fn widen_prior(found: &Identification, file: &str) -> String {
     )
 }
 
+/// Returns the finding on held parameters that cause most of the misfit. A base is left out, which may
+/// take away only half of it.
+fn held_value(found: &Identification) -> Option<&Finding> {
+    let held = found.finding(FindingCode::HeldParameter)?;
+    (!held.word("parameter")?.starts_with("base.")).then_some(held)
+}
+
+/// Largest ratio of the rms error with a held parameter free to that with what a loop found, at which
+/// the two explain the measurements alike.
+const MAX_RATIO_ALIKE: f64 = 1.02;
+
+/// Returns the finding of the fit before a loop on held parameters that explain the measurements as
+/// well as what the loop found, with which `after` was fitted.
+pub fn held_instead<'a>(before: &'a Identification, after: &Identification) -> Option<&'a Finding> {
+    let held = held_value(before)?;
+    let found = after.fitted.identification.rms.norm;
+    (held.number("after")? <= MAX_RATIO_ALIKE * found).then_some(held)
+}
+
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared
 /// problem to rows of `measured_poses` poses, `after` that with what was added, and `results` are the
 /// files that the loop wrote.
@@ -202,7 +221,7 @@ pub fn after_loop(
     if !result.trusted {
         return format!("flexcal identify {named} -v, once what the warnings name is corrected");
     }
-    if fit.has(FindingCode::HeldParameter) {
+    if held_instead(fit, after).is_some() {
         return format!(
             "correct or free in {file} what the warning names, then flexcal loop {named}"
         );

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::fit::{FindingCode, Options, ProgressSink};
+use flexcal::fit::{Options, ProgressSink};
 use flexcal::problem::{self, Problem};
 use flexcal::remainder::Correction;
 use flexcal::report::{self, PredictionAccuracy};
@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
     let outcome = diagnostic::report_fit_once(&closure.after, (common.quiet, common.prints_text()));
-    if let Some(held) = closure.before.fit.finding(FindingCode::HeldParameter) {
+    if let Some(held) = advice::held_instead(&closure.before.fit, &closure.after) {
         diagnostic::warn(&format!("{held}; what was found may only make up for it"));
     }
     if closure.interrupted {

@@ -14,6 +14,7 @@ use super::next::mean_square;
 use super::{
     Criterion, DesignError, Exchange, ExchangeResult, Forecast, Sensitivity, Site, Workspace,
 };
+use crate::error::InputErrorKind;
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
 use crate::numeric::median;
@@ -138,10 +139,11 @@ pub(super) fn fitted_rows(
     given: Option<&Measurements>,
 ) -> Option<(Measurements, usize)> {
     let given = given?;
-    Some(match Split::new(problem, given) {
-        Ok(split) => (given.select(&split.identification), split.held_out.len()),
-        Err(_) => (given.clone(), 0),
-    })
+    match Split::new(problem, given) {
+        Ok(split) => Some((given.select(&split.identification), split.held_out.len())),
+        Err(error) if matches!(*error.kind, InputErrorKind::NoIdentificationRows { .. }) => None,
+        Err(_) => Some((given.clone(), 0)),
+    }
 }
 
 /// Chooses poses as [`plan()`] does, besides `given` rows that are all fitted. The second part of

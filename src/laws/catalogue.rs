@@ -466,7 +466,7 @@ catalogue! {
             TermEntry::at(At::Exposure { by_row: false }, "delay", EXPOSURE_DELAY_SIGMA),
             TermEntry::at(At::Exposure { by_row: true }, "row", ROW_TIME_SIGMA),
         ],
-        says: "camera {camera} exposes its rows one after another while the arm moves",
+        says: "images of camera {camera} are exposed later than the joints are read, row after row",
         needs: &[Need::Velocities],
         ..Family::PLAIN
     };

@@ -36,6 +36,9 @@ pub struct WatchedCause {
     pub kind: CauseKind,
     /// Name for people, such as "zero of joint 2".
     pub label: String,
+    /// Placement that moves the rows in the same way, such as "base or the instrument"; `None` if
+    /// the rows tell the cause from all placements.
+    pub alike: Option<String>,
     /// Index of the gross row among all rows of the table, from 0; `None` for other causes.
     pub row: Option<usize>,
     /// Index of the first row that shows the change among all rows of the table, from 0; `None` if
@@ -68,6 +71,7 @@ impl WatchedCause {
         vec![Self {
             kind: CauseKind::Misread,
             label,
+            alike: None,
             row: None,
             from_row: None,
             probability: 1.0,
@@ -126,6 +130,7 @@ impl Reporter<'_> {
         WatchedCause {
             kind: cause.kind,
             label: cause.label.clone(),
+            alike: None,
             row: assessed.row,
             from_row: None,
             probability: assessed.probability,
@@ -237,7 +242,7 @@ impl Reporter<'_> {
         };
         let placement = self.causes.iter().filter(|of| of.kind.is_placement()).find(is_alike)?;
         let instrument = if placement.kind == CauseKind::Base { " or the instrument" } else { "" };
-        Some(format!("or {}{instrument} moved alike", placement.label))
+        Some(format!("{}{instrument}", placement.label))
     }
 
     /// Returns the number of additional poses like these after which a cause is expected to be nine

@@ -211,18 +211,12 @@ pub fn watch(
         .take(MAX_REPORTED_CAUSES)
         .collect();
     let location = |row: usize| kept.location(row).to_string();
-    let label = |assessed: &AssessedCause| {
-        let label = assessed.label(&at_estimate.causes, location);
-        match report.placement_alike(assessed) {
-            Some(alike) => format!("{label} ({alike})"),
-            None => label,
-        }
-    };
     let mut watched: Vec<WatchedCause> = (0..reported.len())
         .map(|k| WatchedCause {
             row: reported[k].row.map(|row| new[row]),
             from_row: Some(reported[k].onset).filter(|onset| *onset > 0).map(|row| new[row]),
-            label: label(reported[k]),
+            label: reported[k].label(&at_estimate.causes, location),
+            alike: report.placement_alike(reported[k]),
             ..report.cause(reported[k], reported.get(usize::from(k == 0)).copied())
         })
         .collect();

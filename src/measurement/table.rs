@@ -100,7 +100,11 @@ impl Table {
         }
         let layout = Layout::detect(&beginning, dialect);
         let date_order = match DateOrder::of(&beginning) {
-            DateOrder::Unknown if layout.byte() != b',' && has_decimal_commas(&beginning) => {
+            DateOrder::Unknown
+                if dialect.decimal_comma
+                    && layout.byte() != b','
+                    && has_decimal_commas(&beginning) =>
+            {
                 DateOrder::LikelyDayFirst
             }
             order => order,

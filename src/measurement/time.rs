@@ -108,8 +108,10 @@ fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
     let (order, basis) = match (order, DateOrder::of_date(numbers)) {
         // Other dates of the table were read month first because of AM or PM.
         (DateOrder::Unknown, Some(DateOrder::DayFirst)) if is_halved => return None,
+        (DateOrder::Unknown | DateOrder::LikelyDayFirst, None) if is_halved => {
+            (DateOrder::MonthFirst, Basis::HalfOfDay)
+        }
         (DateOrder::LikelyDayFirst, None) => (DateOrder::DayFirst, Basis::DecimalComma),
-        (DateOrder::Unknown, None) if is_halved => (DateOrder::MonthFirst, Basis::HalfOfDay),
         (DateOrder::Unknown, None) => (DateOrder::MonthFirst, Basis::Guess),
         (DateOrder::Unknown | DateOrder::LikelyDayFirst, Some(order)) | (order, _) => {
             (order, Basis::Numbers)

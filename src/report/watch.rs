@@ -203,13 +203,21 @@ fn verdict(watch: &Watch) -> String {
             );
         }
         (Some(cause), _) if watch.unexplained_error().is_some() => {
-            format!("most probable of what was tried, but not the whole: {}", cause.label)
+            format!("most probable of what was tried, but not the whole: {}", named(cause))
         }
-        (Some(cause), _) => cause.label.clone(),
-        (None, Some(cause)) => format!("cause uncertain; most probable: {}", cause.label),
+        (Some(cause), _) => named(cause),
+        (None, Some(cause)) => format!("cause uncertain; most probable: {}", named(cause)),
         (None, None) => String::new(),
     };
     format!("Changed, seen after {}: {what}", counted(row, "row"))
+}
+
+/// Returns the name of a cause, with the placement that moves the rows in the same way.
+fn named(cause: &WatchedCause) -> String {
+    match &cause.alike {
+        Some(alike) => format!("{} (or {alike} moved alike)", cause.label),
+        None => cause.label.clone(),
+    }
 }
 
 /// Returns the lines of a cause in the table of causes. Each change of two causes together has a
@@ -225,7 +233,7 @@ fn lines(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<Vec<Stri
         _ => (changes.join(", "), &[][..]),
     };
     let line = vec![
-        cause.label.clone(),
+        named(cause),
         format!("{:.3}", cause.probability),
         first,
         or_dash(cause.left_out_error, in_unit),

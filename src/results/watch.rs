@@ -54,6 +54,9 @@ pub struct CauseResult {
     /// Kind of the cause, such as `joint-zero`, `tool`, `noise` or `row`.
     pub kind: &'static str,
     pub label: String,
+    /// Placement that moves the rows in the same way, so that they do not tell the two apart; null
+    /// if there is none.
+    pub alike: Option<String>,
     /// Row with a gross error, counted from 1 among all rows of the table; null for other causes.
     pub row: Option<usize>,
     /// First row that shows the change, counted from 1; null if it happened before the table.
@@ -117,6 +120,7 @@ impl CauseResult {
         Self {
             kind: cause.kind.as_str(),
             label: cause.label.clone(),
+            alike: cause.alike.clone(),
             row: cause.row.map(|row| row + 1),
             from_row: cause.from_row.map(|row| row + 1),
             probability: cause.probability,

@@ -82,10 +82,13 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
         let line = line(record.position());
         let is_end =
             |cell: &str| ["base", "tool", "tcp", "flange"].contains(&&*cell.to_lowercase());
-        if record.iter().all(str::is_empty) || record.get(0).is_some_and(is_end) {
+        if record.iter().all(str::is_empty) {
             continue;
         }
         let (mut entries, mut variable) = (Vec::new(), None);
+        if record.get(0).is_some_and(is_end) {
+            entries.push("kind = \"fixed\"".to_owned());
+        }
         for column in &columns {
             let cell = record.get(column.place).unwrap_or_default();
             let unreadable = || {

@@ -9,6 +9,9 @@ use crate::common::arms::parse;
 use crate::common::made::{fit, fit_as_command};
 use crate::judged::{PRIORS, measured, text};
 
+/// Number in a row of a column, as a function of the row and the right column.
+type Number = fn(usize, &[f64]) -> f64;
+
 /// Number of joints of the arm.
 const JOINTS: usize = 5;
 
@@ -19,25 +22,28 @@ fn arm() -> (Problem, Dataset) {
     (problem, data)
 }
 
-/// Returns the finding with a code as text.
-fn told(found: &Identification, code: FindingCode) -> String {
-    found.finding(code).unwrap().to_string()
+/// Returns the positions of the arm of a problem whose target sits 40 mm elsewhere.
+fn elsewhere(text: &str) -> Vec<Vector3<f64>> {
+    let problem = parse(&text.replace("0.05, 0.02, 0.12", "0.05, -0.02, 0.12"));
+    measured(&problem, 3).measurements.positions
 }
 
-/// Number of a row in a mistaken column, as a function of the right column.
-type Mistake = fn(usize, &[f64]) -> f64;
+/// Returns the finding with a code as text; empty if there is none.
+fn told(found: &Identification, code: FindingCode) -> String {
+    found.finding(code).map(ToString::to_string).unwrap_or_default()
+}
 
 #[test]
 fn what_the_numbers_of_a_column_are_is_named() {
     let (problem, clean) = arm();
-    let cases: [(usize, Mistake, &str); 4] = [
+    let cases: [(usize, Number, &str); 4] = [
         (2, |row, q| q[row.saturating_sub(1)], "each of its numbers belongs to the row before"),
-        (0, |row, q| q[(row + 1).min(89)], "each of its numbers belongs to the row after"),
+        (3, |row, q| q[(row + 1).min(89)], "each of its numbers belongs to the row after"),
         (1, |row, q| q[if (20..35).contains(&row) { 20 } else { row }], "it holds one number"),
         (
             3,
             |row, q| if row < 45 { q[row] } else { q[row] + 1.5 },
-            "its numbers are too large by 86",
+            "its numbers are too large by 8",
         ),
     ];
     for (joint, number, words) in cases {
@@ -67,17 +73,18 @@ fn the_reading_with_which_a_block_of_rows_fits_is_named() {
     let shifted = text(&data);
     assert!(shifted.contains("belong to the joint angles of the row before"), "{shifted}");
     let mut data = clean;
-    data.measurements.positions[..9].iter_mut().for_each(|at| at.x += 0.4);
+    for at in &mut data.measurements.positions[..9] {
+        *at += Vector3::new(0.4, -0.3, 0.2);
+    }
     let moved = text(&data);
-    assert!(moved.contains("the base stands elsewhere, by 400."), "{moved}");
+    assert!(moved.contains("they fit where the base stands elsewhere, by"), "{moved}");
 }
 
 #[test]
 fn the_mistake_in_held_out_rows_is_named() {
     let (problem, clean) = arm();
     assert!(!fit_as_command(&problem, &clean).has(FindingCode::HeldOutMissed));
-    let elsewhere = parse(&text(PRIORS).replace("0.05, 0.02, 0.12", "0.05, -0.02, 0.12"));
-    let other = measured(&elsewhere, 3).measurements.positions;
+    let other = elsewhere(&text(&format!("{PRIORS}\n'base.*' = {{ free = true }}")));
     let text = |change: &dyn Fn(usize, &mut Dataset)| {
         let mut data = clean.clone();
         (60..90).for_each(|row| change(row, &mut data));
@@ -106,8 +113,7 @@ fn places_that_change_twice_or_by_turns_are_named() {
     let text = text(&format!("{free}\n'base.*' = {{ free = true }}"));
     let problem = parse(&text);
     let mut data = measured(&problem, 3);
-    let elsewhere = parse(&text.replace("0.05, 0.02, 0.12", "0.05, -0.02, 0.12"));
-    let other = measured(&elsewhere, 3).measurements.positions;
+    let other = elsewhere(&text);
     for row in (0..90).filter(|row| row % 3 == 1) {
         data.measurements.positions[row] = other[row];
     }

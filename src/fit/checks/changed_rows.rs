@@ -39,11 +39,11 @@ const MAX_SIZE: [usize; 2] = [4000, 150];
 /// Smallest probability of a residual as large as that of two arms, by noise alone. A larger
 /// residual shows that the model lacks something, which two arms approximate better than one.
 const MIN_NOISE_PROBABILITY: f64 = 1e-3;
+/// Largest share of the misfit beyond the declared noise that two places of a target leave. A choice of
+/// rows explains much of any misfit.
+const MAX_LEFT_BY_TARGETS: f64 = 0.02;
 /// Largest number of rows that a text lists.
-const MAX_LISTED: usize = 4;
-/// Smallest mean decrease of χ² of a row with another target, relative to what is left in a row, at
-/// which two places of a target are told apart.
-const MIN_CLEARNESS: f64 = 100.0;
+const MAX_LISTED: usize = 3;
 /// Largest share of the changed rows on the wrong side of a limit of a column that tells them from the
 /// others.
 const MAX_MIXED_SHARE: f64 = 0.1;
@@ -205,10 +205,10 @@ fn mixed_targets(fit: &CheckedFit, linear: &Linear, places: &Places) -> Option<F
         let step = Step { place, first: 0, cost, change, columns: columns.len() };
         // Chance chooses from all divisions of the rows.
         let tries = 2_f64.powi(i32::try_from(fit.fitting.split.identification.len()).ok()?);
-        let count = fit.fitting.split.identification.len() as f64;
-        // Each row has to show by itself where its target sits.
-        let is_clear = (linear.cost - cost) / rows.len() as f64 >= MIN_CLEARNESS * cost / count;
-        if !(is_clear && is_beyond_chance(linear, &step, tries)) || is_told_by_column(fit, &rows) {
+        let left = (step.cost - freedom_of(linear, &step)).max(0.0);
+        let is_clear = left <= MAX_LEFT_BY_TARGETS * (linear.cost - linear.freedom);
+        let is_sure = is_clear && is_beyond_chance(linear, &step, tries);
+        if !is_sure || is_told_by_column(fit, &rows) {
             return None;
         }
         let identification = &fit.fitting.split.identification;
@@ -380,10 +380,8 @@ fn finding(
     let freedom = (linear.freedom - columns as f64).max(1.0);
     let before = (linear.cost / linear.freedom).sqrt();
     let after = (cost / freedom).sqrt();
-    let change = if changes.len() > 1 { "these changes" } else { "this change" };
     let text = format!(
-        "{}: {change} would leave, as linearised, a residual of {after:.1} times the declared σ \
-         instead of {before:.1}",
+        "{}: as linearised, that leaves {after:.1} times the declared σ instead of {before:.1}",
         texts.join("; ")
     );
     let name = match first.place {

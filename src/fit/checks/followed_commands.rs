@@ -71,7 +71,7 @@ const MAX_DIFFERENCE: f64 = 0.1;
 /// Smallest share of the rows that a relation explains.
 const MIN_RELATED_SHARE: f64 = 0.9;
 /// Smallest share of the rows in which a relation changes the coordinate.
-const MIN_CHANGED_SHARE: f64 = 0.1;
+const MIN_CHANGED_SHARE: f64 = 0.05;
 
 /// Returns an angle between −π and π.
 fn wrapped(angle: f64) -> f64 {

@@ -22,7 +22,7 @@ use crate::quantity::format::{decimals, number};
 /// take away if they are free. They are then named.
 const MIN_EXPLAINED_SHARES: [f64; 2] = [0.8, 0.95];
 /// Smallest share that the linearised fit must promise, at which they are fitted in full.
-const MIN_EXPECTED_SHARES: [f64; 2] = [0.5, 0.8];
+const MIN_EXPECTED_SHARE: f64 = 0.5;
 /// Smallest share that a held base takes away if it is free and no single parameter explains the
 /// misfit. A base is seldom known as well as the geometry, so that it is named beside other causes.
 const MIN_SHARE_OF_BASE: f64 = 0.5;
@@ -149,15 +149,14 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
         sets.iter().filter_map(fitted).filter(is_better).collect()
     };
     let mut freed = explaining(&single, MIN_EXPLAINED_SHARES[0]);
-    let is_none = freed.is_empty();
-    if is_none && may_move {
+    if freed.is_empty() && may_move {
         freed = explaining(&[vec![BASE.to_owned()]], MIN_SHARE_OF_BASE);
     }
-    // A base that moved explains as much as two parameters of joint 1, and is likelier.
-    let is_whole = |freed: &Freed| freed.trial.rms.powi(2) <= limit(MIN_EXPLAINED_SHARES[1]);
-    if is_none && !freed.iter().any(is_whole) {
-        let of_pairs = explaining(&pairs, MIN_EXPLAINED_SHARES[1]);
-        freed = if of_pairs.is_empty() { freed } else { of_pairs };
+    // Two may explain what a single one, or the base, leaves.
+    let most_left = limit(MIN_EXPLAINED_SHARES[1]);
+    if freed.iter().all(|freed| freed.trial.rms.powi(2) > most_left) {
+        let both = explaining(&pairs, MIN_EXPLAINED_SHARES[1]);
+        freed = if both.is_empty() { freed } else { both };
     }
     freed.sort_by(|a, b| a.trial.left_out.total_cmp(&b.trial.left_out));
     let best = freed.first()?;
@@ -261,8 +260,8 @@ fn promising(fit: &CheckedFit) -> Option<[Vec<Vec<String>>; 2]> {
     let problem = with_free(fit.problem, held.iter().cloned());
     let gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))?;
     let best = |count: usize| {
-        let share = MIN_EXPECTED_SHARES[count - 1];
-        let is_of = |(set, gain): &&(Vec<usize>, f64)| set.len() == count && *gain >= share;
+        let is_of =
+            |(set, gain): &&(Vec<usize>, f64)| set.len() == count && *gain >= MIN_EXPECTED_SHARE;
         let mut sets: Vec<&(Vec<usize>, f64)> = gains.iter().filter(is_of).collect();
         sets.sort_by(|a, b| b.1.total_cmp(&a.1));
         let names = |(set, _): &(Vec<usize>, f64)| set.iter().map(|&k| held[k].clone()).collect();

@@ -145,7 +145,9 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     let is_of_place = |found: &Finding| {
         found.code == FindingCode::RowsChanged && found.word("place") != Some("arm")
     };
-    if findings.iter().any(is_of_place) {
+    let is_other =
+        |found: &Finding| OF_TABLE.contains(&found.code) && !doubted_rows::is_open(found);
+    if findings.iter().any(is_of_place) && !findings.iter().any(is_other) {
         findings.retain(|found| !doubted_rows::is_open(found));
     }
     // A mistake in the whole table or in some rows may look like a change from a row on.
