@@ -101,7 +101,9 @@ pub fn after_fit(
             )
         }
         None if found.has(FindingCode::Misread) => correct(),
-        None if let Some(what) = camera_advice(found, &file) => as_warned(&what),
+        None if let Some(what) = camera_advice(found, &file) => {
+            format!("{what}, then flexcal identify {named}")
+        }
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
@@ -414,10 +416,13 @@ fn measures_no_position(problem: &Problem) -> bool {
 /// is.
 fn camera_advice(found: &Identification, file: &str) -> Option<String> {
     if found.has(FindingCode::LensContradicted) {
-        return Some(format!("correct or free the intrinsics in {file}"));
+        return Some(format!("correct or free the intrinsics in {file} as the warning says"));
     }
     let are_open = found.has(FindingCode::ViewsUndecided);
-    are_open.then(|| "add views or declare a place".to_owned())
+    are_open.then(|| {
+        "add views with the camera turned about two axes, or declare where camera or marker is"
+            .to_owned()
+    })
 }
 
 /// States what to do about the first camera with a coordinate that the rows do not determine; `None`

@@ -16,6 +16,11 @@ pub enum UrdfErrorKind {
     #[error("\"{cell}\" is not a number, nor a coordinate with its constant part such as q2 - 90")]
     SheetCell { cell: String },
     #[error(
+        "the row \"{name}\" is no joint; leave it out, and declare what it says in [base] or [tool] of the \
+         problem"
+    )]
+    SheetEnd { name: String },
+    #[error(
         "no table of Denavit-Hartenberg parameters: it has no columns such as theta_deg, d_mm, \
          a_mm, alpha_deg"
     )]

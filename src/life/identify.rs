@@ -266,8 +266,9 @@ fn contradiction(
     let misfit = misfit * sensitive.coordinates.iter().sum::<usize>() as f64;
     let warmed = warmth.as_ref().map(|_| (&*causes, misfit));
     let uncertainty = factor(&covariance(&extended, prior, &sensitive, warmed));
-    let assessed = assess(&sensitive, &uncertainty, &causes, false)
-        .and_then(|assessed| paired(assessed, &sensitive, &uncertainty, &mut causes));
+    let assessed = assess(&sensitive, &uncertainty, &causes, false).and_then(|assessed| {
+        paired(assessed, predicted.is_some(), (&sensitive, &uncertainty), &mut causes)
+    });
     let Some(assessed) = assessed else { return (None, None) };
     let chi2 = chi2_of_rows(&assessed);
     let evidence = contradicting_evidence(&assessed);
@@ -330,14 +331,19 @@ fn contradicting_evidence(assessed: &Assessment) -> Option<f64> {
 }
 
 /// Returns the assessment with pairs of causes, as `watch` tries them, if the rows contradict the
-/// earlier estimate, and unchanged otherwise. `None` if a number is not finite.
+/// earlier estimate, and unchanged otherwise. If the earlier fit left a misfit that a remainder
+/// corrects (`has_remainder`), a second cause would fit a part of it: a single change of the arm that
+/// is the most probable cause is then fitted first, and the rows are tested again. `None` if a number
+/// is not finite.
 fn paired(
     assessed: Assessment,
-    rows: &SensitiveRows,
-    factor: &DMatrix<f64>,
+    has_remainder: bool,
+    (rows, factor): (&SensitiveRows, &DMatrix<f64>),
     causes: &mut Vec<Cause>,
 ) -> Option<Assessment> {
-    if contradicting_evidence(&assessed).is_none() {
+    let first = assessed.causes.first().map(|first| &causes[first.cause]);
+    let is_of_arm = first.is_some_and(|cause| !cause.columns.is_empty());
+    if has_remainder && is_of_arm || contradicting_evidence(&assessed).is_none() {
         return Some(assessed);
     }
     with_pairs(assessed, rows, factor, causes)
@@ -486,6 +492,6 @@ fn tested(
     let mut factor = DMatrix::zeros(rows.sensitivity.ncols(), residual.len());
     factor.rows_mut(first, residual.len()).copy_from(&lower);
     let assessed = assess(&rows, &factor, &causes, false)?;
-    let assessed = paired(assessed, &rows, &factor, &mut causes)?;
+    let assessed = paired(assessed, true, (&rows, &factor), &mut causes)?;
     Some(CorrectedTest { assessed, causes, extended, rows, places })
 }

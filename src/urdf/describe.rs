@@ -401,7 +401,6 @@ fn parameters(rows: &[Row], free: &[String], has_camera: bool) -> String {
          \"camera*.c*\" = { free = true }\n\
          \"camera*.k*\" = { free = true }\n\
          \"camera*.p*\" = { free = true }\n\
-         \"camera*.k3\" = { fixed = true }\n\
          # Held are those that views of the board cannot tell from the ones above.\n"
     } else {
         "\"tool.*\" = { sigma_mm = 100.0 }                    # where the target sits on the tip\n\

@@ -26,6 +26,8 @@ const KEYS: [Key; 6] = [
     ("max", &["upper"], None),
 ];
 
+/// Marks of a header whose α and a belong to the row before, as in the modified form.
+const OF_THE_ROW_BEFORE: [&str; 4] = ["i-1", "(i-1)", "{i-1}", "i−1"];
 /// Names of a joint coordinate in a cell, without its number.
 const COORDINATES: [&str; 6] = ["q", "θ", "theta", "t", "d", "s"];
 
@@ -72,23 +74,24 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
     let header = reader.headers().map_err(|error| bad(&error))?.clone();
     let columns = columns(&header, |column| place(1, Some(column)))?;
     let name = file.file_stem().map_or("arm".into(), |stem| stem.to_string_lossy());
-    let mut out = format!(
-        "name = {}\ndh = \"standard\"          # Rz(θ+q) Tz(d) Tx(a) Rx(α); without the line: Rx(α) \
-         Tx(a) Rz(θ+q) Tz(d)\njoint = [\n",
-        quoted(&name)
-    );
+    let form = if is_modified(&header) {
+        "# Modified form: Rx(α) Tx(a) Rz(θ+q) Tz(d)"
+    } else {
+        "dh = \"standard\"          # Rz(θ+q) Tz(d) Tx(a) Rx(α); the header alpha_i-1, a_i-1 takes the other form"
+    };
+    let mut out = format!("name = {}\n{form}\njoint = [\n", quoted(&name));
     for record in reader.records() {
         let record = record.map_err(|error| bad(&error))?;
         let line = line(record.position());
-        let is_end =
-            |cell: &str| ["base", "tool", "tcp", "flange"].contains(&&*cell.to_lowercase());
         if record.iter().all(str::is_empty) {
             continue;
         }
-        let (mut entries, mut variable) = (Vec::new(), None);
-        if record.get(0).is_some_and(is_end) {
-            entries.push("kind = \"fixed\"".to_owned());
+        let is_end =
+            |cell: &&str| ["base", "tool", "tcp", "flange"].contains(&&*cell.to_lowercase());
+        if let Some(name) = record.get(0).filter(is_end) {
+            return Err(place(line, None).error(UrdfErrorKind::SheetEnd { name: name.to_owned() }));
         }
+        let (mut entries, mut variable) = (Vec::new(), None);
         for column in &columns {
             let cell = record.get(column.place).unwrap_or_default();
             let unreadable = || {
@@ -117,6 +120,11 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
     Ok(out + "]\n")
 }
 
+/// Returns true if the header says that α and a belong to the row before.
+fn is_modified(header: &StringRecord) -> bool {
+    header.iter().any(|name| OF_THE_ROW_BEFORE.iter().any(|mark| name.contains(mark)))
+}
+
 /// Returns the columns that hold parameters of joints. `at` is the place of a column in messages.
 fn columns(
     header: &StringRecord,
@@ -130,6 +138,10 @@ fn columns(
         let mut keys = KEYS.iter();
         let is_meant = |(key, others, _): &&Key| *key == word || others.contains(&word);
         let Some(&(key, _, units)) = keys.find(is_meant) else { continue };
+        let rest = OF_THE_ROW_BEFORE.iter().fold(rest.to_owned(), |rest, of| rest.replace(of, ""));
+        let rest = rest.trim_start_matches('_');
+        let of_row = rest.strip_prefix('i').filter(|after| !after.starts_with(char::is_alphabetic));
+        let rest = of_row.unwrap_or(rest);
         let unit = match rest.trim_matches(|c: char| !c.is_alphanumeric() && c != '°') {
             "deg" | "degree" | "degrees" | "°" => Some("deg"),
             "rad" => Some("rad"),

@@ -38,13 +38,17 @@ fn truths(prefix: &str) -> Vec<(String, Value)> {
 /// problem.
 fn of(problem: &str, rules: &str, name: &str) -> Evidence {
     let path = folder().join(problem);
-    let text = fs::read_to_string(&path).unwrap().replacen(
+    let mut text = fs::read_to_string(&path).unwrap().replacen(
         "[parameters]\n",
         &format!("[parameters]\n{rules}"),
         1,
     );
+    let table = folder().join(format!("{name}.csv"));
+    if !fs::read_to_string(&table).unwrap().contains("validation") {
+        text = text.replace("held_out = { column = \"split\" }", "held_out = \"none\"");
+    }
     let problem = Problem::parse(&text, &path).unwrap();
-    let (data, _) = Dataset::read_files(&[folder().join(format!("{name}.csv"))], &problem).unwrap();
+    let (data, _) = Dataset::read_files(&[table], &problem).unwrap();
     trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap()
 }
 

@@ -16,7 +16,10 @@ use rand_chacha::ChaCha8Rng;
 use crate::cameras::{measured_with, split};
 use crate::common::arms::parse;
 use crate::common::made::{draw, model_of};
-use crate::common::reading::{assert_says, problem_error, read_table, table_error};
+use crate::common::program::assert_contains;
+use crate::common::reading::{
+    assert_says, problem_error, read_table, table_error, try_table, words,
+};
 
 /// Arm of four joints, one of which slides, with a camera on its hand that sees a board in the
 /// world, and a second camera in the world.
@@ -228,8 +231,11 @@ fn a_rolling_shutter_is_named_and_no_cause_of_the_arm() {
 fn velocities_have_units_and_effects_cameras() {
     let problem = parse(&format!("{ARM}{SHUTTER}"));
     let table = table(10);
-    let error = table_error(&problem, &table.replace("qd2_deg_per_s", "qd2_deg"));
-    assert_says(&error, &["qd2_deg", "a velocity", "qd2_rad_per_s", "qd2_deg_per_s"]);
+    let error = table_error(&problem, &table.replace("qd2_deg_per_s", "qd2_mm_per_s"));
+    assert_says(&error, &["qd2_mm_per_s", "a velocity", "qd2_rad_per_s", "qd2_deg_per_s"]);
+    // Desired angles have such names, too.
+    let desired = try_table(&problem, &table.replace("qd2_deg_per_s", "qd2_deg"));
+    assert_contains(&words(&desired.unwrap().1), &["qd2_deg"]);
     let unknown = format!("{ARM}{}", SHUTTER.replace("hand", "hnad"));
     assert_says(
         &problem_error(&unknown),

@@ -45,6 +45,15 @@ fn a_data_sheet_may_be_a_table_with_units_in_its_header() {
     assert_contains(&folder.read("arm/problem.toml"), &["dh = \"standard\"", rows, "[data]"]);
     folder.flexcal("init slide.csv --out slide").success();
     assert_contains(&folder.read("slide/problem.toml"), &["kind = \"prismatic\"", "q1_mm"]);
+    let modified = "alpha_i-1 [deg],a_i-1 [mm],d_i [mm],theta_i [deg]\n0,0,400,q1\n-90,25,0,q2\n";
+    std::fs::write(folder.path("other.csv"), modified).unwrap();
+    folder.flexcal("init other.csv --out other").success();
+    let text = folder.read("other/problem.toml");
+    assert_contains(
+        &text,
+        &["# Modified form", "{ d_mm = 400 },\n  { alpha_deg = -90, a_mm = 25 }"],
+    );
+    assert!(!text.contains("dh = "), "{text}");
     for (header, why) in [
         ("theta,d,a,alpha", "column theta: the column has no unit; write theta_deg or theta_rad"),
         ("theta_deg,d_deg,alpha_deg", "column d_deg: the column has no unit; write d_mm or d_m"),

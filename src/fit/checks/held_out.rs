@@ -316,7 +316,14 @@ fn finding_of(rows: &[Outlier], of: usize) -> Finding {
         "{count} of {of} held-out rows {verb} too far off to be noise: {}{more}",
         named.join(", ")
     );
-    Finding::new(FindingCode::HeldOutOutliers, [outliers_as_json(rows), of.into()], text)
+    let finding =
+        Finding::new(FindingCode::HeldOutOutliers, [outliers_as_json(rows), of.into()], text);
+    if rows.iter().any(|row| row.kind != "pixel") {
+        return finding;
+    }
+    finding.with_remedy(
+        "leave out corners that the detector misplaced, or weigh them less by [robust]".to_owned(),
+    )
 }
 
 impl Identification {

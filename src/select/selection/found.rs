@@ -166,9 +166,8 @@ pub(super) fn found(
         };
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear_probability);
         let law = law.or_else(|| is_evaluated.then_some(0.0));
-        let is_significant = p_value < rules.leaving_level;
         let status_at = |law: Option<f64>| {
-            let status = Status::of(law, rules.stated, (is_significant, verdict));
+            let status = Status::of(law, rules, (p_value, verdict));
             if is_trusted { status } else { status.max(Status::Probable) }
         };
         Found {

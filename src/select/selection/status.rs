@@ -3,10 +3,14 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::select::SelectionRules;
 use crate::select::reference_check::ReferenceVerdict;
 
 /// Smallest probability at which a law is more probable than all others together.
 const MIN_PROBABLE: f64 = 0.5;
+/// Largest corrected p-value of an effect whose law may be stated. Beyond it, noise alone improves the
+/// fit as much as the effect does, whatever the linearised evidence says.
+const MAX_P_VALUE: f64 = 0.9;
 
 /// Strongest claim about an effect of the extended problem, the strongest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -36,18 +40,18 @@ impl Status {
     }
 
     /// Returns the status of an effect. `law` is the probability of its law, `None` if no evidence
-    /// was evaluated; the effect is then found if its F test is significant. `stated` is the
-    /// smallest probability of a found law. `witness` is the verdict of measurements that were not
-    /// fitted.
+    /// was evaluated; the effect is then found if its F test, with the p-value `p_value`, is
+    /// significant. `witness` is the verdict of measurements that were not fitted.
     pub(super) fn of(
         law: Option<f64>,
-        stated: f64,
-        (is_significant, witness): (bool, Option<ReferenceVerdict>),
+        rules: &SelectionRules,
+        (p_value, witness): (f64, Option<ReferenceVerdict>),
     ) -> Self {
         match law {
             _ if witness == Some(ReferenceVerdict::Contradicted) => Self::Contradicted,
-            None if is_significant => Self::Found,
-            Some(law) if law >= stated => Self::Found,
+            _ if p_value > MAX_P_VALUE => Self::Located,
+            None if p_value < rules.leaving_level => Self::Found,
+            Some(law) if law >= rules.stated => Self::Found,
             Some(law) if law >= MIN_PROBABLE => Self::Probable,
             _ => Self::Located,
         }
@@ -96,14 +100,16 @@ mod tests {
 
     #[test]
     fn a_status_claims_no_more_than_the_probability_of_the_law() {
-        let status = |law, is_significant| Status::of(law, 0.9, (is_significant, None));
-        assert_eq!(status(None, true), Status::Found);
-        assert_eq!(status(None, false), Status::Located);
-        assert_eq!(status(Some(0.95), false), Status::Found);
-        assert_eq!(status(Some(0.7), true), Status::Probable);
-        assert_eq!(status(Some(0.3), true), Status::Located);
-        let against = (true, Some(ReferenceVerdict::Contradicted));
-        assert_eq!(Status::of(Some(0.99), 0.9, against), Status::Contradicted);
+        let rules = SelectionRules::default();
+        let status = |law, p_value| Status::of(law, &rules, (p_value, None));
+        assert_eq!(status(None, 1e-3), Status::Found);
+        assert_eq!(status(None, 0.3), Status::Located);
+        assert_eq!(status(Some(0.95), 0.3), Status::Found);
+        assert_eq!(status(Some(0.95), 1.0), Status::Located);
+        assert_eq!(status(Some(0.7), 1e-3), Status::Probable);
+        assert_eq!(status(Some(0.3), 1e-3), Status::Located);
+        let against = (1e-3, Some(ReferenceVerdict::Contradicted));
+        assert_eq!(Status::of(Some(0.99), &rules, against), Status::Contradicted);
     }
 
     #[test]
