@@ -185,6 +185,15 @@ fn two_changes(
         return None;
     }
     steps.sort_by_key(|step| step.first);
+    let [first, second] = &mut steps;
+    if first.place == second.place {
+        // Few rows between two changes are rows that are wrong.
+        if second.first - first.first < MIN_ROWS {
+            return None;
+        }
+        // Each is stated from what was before both.
+        second.change += &first.change;
+    }
     finding(fit, linear, places, &steps.map(|step| of_order(fit, order, step)))
 }
 

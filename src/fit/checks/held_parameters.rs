@@ -37,6 +37,8 @@ const MIN_OWN_SHARE: f64 = 1e-6;
 /// Squared length of the row that keeps a free parameter determined, as a fraction of the squared
 /// length of its column.
 const RIDGE: f64 = 1e-12;
+/// Largest ratio of the displacement by a held parameter's deviation to the rms error of the fit.
+const MAX_DISPLACEMENT_RATIO: f64 = 50.0;
 /// Largest ratio of the mean square of left-out errors to that of the best held parameter, at which
 /// another one acts alike.
 const MAX_RATIO_ALIKE: f64 = 1.2;
@@ -115,6 +117,7 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
         return None;
     }
     let rows = fit.kind(leading).rows;
+    let rms = fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x));
     // All fits have the declared σ, so that the priors weigh equally.
     let refit = |problem: &Problem, names: &[String]| {
         fit.with_problem(problem, |fitting| {
@@ -125,15 +128,17 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
                 }
                 let mut parameters = fitting.model.parameters.iter().zip(end.x.iter());
                 let (parameter, x) = parameters.find(|(parameter, _)| parameter.name == *name)?;
-                Some((shown(parameter, *x), prior(parameter, *x)))
+                let arm = if parameter.unit() == Unit::Angle { fitting.model.reach() } else { 1.0 };
+                // Other parameters make up for nearly all of such a deviation, so none is shown.
+                let is_plausible = x.abs() * arm <= MAX_DISPLACEMENT_RATIO * rms;
+                is_plausible.then(|| (shown(parameter, *x), prior(parameter, *x)))
             };
             let freed: Option<Vec<_>> = names.iter().map(freed).collect();
             Some((freed?, Trial::of(fit, &rows, (fitting, &end))))
         })?
     };
     let (_, declared) = refit(fit.problem, &[])?;
-    let noise =
-        fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x)).powi(2) / fit.noise_factor;
+    let noise = rms.powi(2) / fit.noise_factor;
     let misfit = (declared.rms.powi(2) - noise).max(0.0);
     let limit = |share: f64| (1.0 - share).mul_add(misfit, noise);
     let fitted = |names: &Vec<String>| {
