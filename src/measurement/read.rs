@@ -94,15 +94,15 @@ impl Measurements {
         table_use: Use,
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let as_declared = Self::read_files(files, problem, table_use);
-        let mut moved = problem.clone();
-        let given = moved.data.joint_log.as_mut().filter(|log| log.is_given);
+        let given = problem.data.joint_log.as_ref().filter(|log| log.is_given);
         let found = as_declared.as_ref().err().and_then(|error| match &*error.kind {
             InputErrorKind::Table(kind) => kind.clock_offset(),
             _ => None,
         });
         let Some((log, found)) = given.zip(found) else { return as_declared };
         let Some(by) = log.by.moved_to(found) else { return as_declared };
-        log.by = by;
+        let mut moved = problem.clone();
+        moved.data.joint_log = Some(JointLog { by, ..log.clone() });
         let location = Location::file(log.files.first().map_or(Path::new(""), PathBuf::as_path));
         let [offset, tolerance] = found.clone();
         let kind = WarningKind::ClockOffsetFound { offset, tolerance };

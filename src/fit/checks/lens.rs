@@ -51,9 +51,9 @@ const MIN_NOISE_FREEDOM: f64 = 200.0;
 /// Within the views, no error of the arm acts: there, free intrinsics show their errors whatever else
 /// is wrong ([`is_shown_within_views`]). Otherwise this requires two conditions. By an F test, the
 /// decrease of χ² by the freed parameters is larger than noise explains. The decrease is also several
-/// times the misfit that remains beyond the noise of pixels. Otherwise the arm or a marker may be the cause, and free intrinsics only absorb a
-/// part of their error. The noise of pixels is that within views ([`noise_within_views`]), or else
-/// the declared one.
+/// times the misfit that remains beyond the noise of pixels. Otherwise the arm or a marker may be the
+/// cause, and free intrinsics only absorb a part of their error. The noise of pixels is that within
+/// views ([`noise_within_views`]), or else the declared one.
 ///
 /// `fit` repeats the fit with another problem. Returns `None` without a comparison if no row
 /// measures pixels, or if all intrinsics are free.
@@ -94,13 +94,13 @@ pub(in crate::fit) fn lens_finding(
     let before_within = noise_within_views(problem, data, found).map(|within| within.noise);
     let is_bent = shape > MIN_SHAPE_RATIO
         && before_within.is_some_and(|before| before < MIN_DECREASE * noise);
+    let is_notable = before > FAR_BELOW_DECLARED || before > MIN_DECREASE * after;
     let explains = chance <= MAX_CHANCE_PROBABILITY
         && gain > MIN_GAIN_RATIO * remaining
-        && (before > FAR_BELOW_DECLARED || before > MIN_DECREASE * after)
+        && is_notable
         && !is_bent;
     let shown = before_within.zip(of_views).filter(|&(before, of)| {
-        is_shown_within_views((before, of.noise), of.freedom, fixed.len() as f64)
-            && (before > FAR_BELOW_DECLARED || before > MIN_DECREASE * after)
+        is_notable && is_shown_within_views((before, of.noise), of.freedom, fixed.len() as f64)
     });
     if !explains && shown.is_none() {
         return None;
