@@ -85,10 +85,9 @@ pub fn after_fit(
             format!("flexcal identify {named} fits these rows without the prior")
         }
         // A search for effects would attribute the change to the model, even if the fit is trusted.
-        _ if found.has(FindingCode::RowsChanged) => format!(
-            "follow the warning on the row from which on something changed, then flexcal \
-             identify {named}"
-        ),
+        _ if found.has(FindingCode::RowsChanged) => {
+            format!("follow the warning on the rows that changed, then flexcal identify {named}")
+        }
         Some(look) => format!("{look}; if they are right, {search}"),
         // A misreading with another remedy leaves more than noise, so that it explains a part only.
         None if found
@@ -126,6 +125,7 @@ pub fn after_fit(
             "correct the table or {file} as the warning says, then flexcal identify {named}; if \
              the input is right, flexcal loop {named} looks for what the model lacks"
         ),
+        None if found.has(FindingCode::HeldOutMissed) => as_warned("check the held-out rows"),
         None if found.has(FindingCode::PayloadAtTarget) => format!(
             "declare the place of the payload in {file} as the warning says, then flexcal \
              identify {named}"
@@ -222,6 +222,9 @@ pub fn after_loop(
     }
     if !result.trusted {
         return format!("flexcal identify {named} -v, once what the warnings name is corrected");
+    }
+    if fit.has(FindingCode::RowsChanged) && result.effects.is_empty() {
+        return format!("follow the warning on the rows that changed, then flexcal loop {named}");
     }
     if held_instead(fit, after).is_some() {
         return format!(

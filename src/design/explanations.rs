@@ -35,7 +35,7 @@ pub struct Explanations {
 /// Error of a loop.json that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ExplanationsError {
-    #[error("{}: cannot be read: {source}; flexcal loop writes it", file.display())]
+    #[error("{}: cannot be read ({source}); flexcal loop writes it", file.display())]
     Unreadable { file: PathBuf, source: io::Error },
     #[error("{}: not a loop.json: {source}", file.display())]
     Syntax { file: PathBuf, source: serde_json::Error },

@@ -246,8 +246,8 @@ pub enum WarningKind {
     )]
     HoistPullsDown,
     #[error(
-        "no joint turns by more than {widest}° from zero; if the columns are in radians, their \
-         names end in _rad"
+        "no joint turns by more than {widest}° from zero, and this row turns it most; if the \
+         columns are in radians or turns, let their names end in _rad or convert them"
     )]
     FewDegrees { widest: String },
     #[error(

@@ -32,7 +32,7 @@ pub enum PriorError {
         file.display()
     )]
     Strategy { file: PathBuf, found: &'static str },
-    #[error("{arms} estimates are too few for a fleet; give those of at least {least} arms")]
+    #[error("a fleet of {arms} is too small; give the estimates of at least {least} arms")]
     FewArms { arms: usize, least: usize },
     #[error("{}: is of another type of arm than {}: {part} differs", file.display(), other.display())]
     OtherType { file: PathBuf, other: PathBuf, part: String },

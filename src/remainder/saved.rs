@@ -48,7 +48,7 @@ pub enum SavedRemainderError {
     Changed { file: PathBuf, key: String },
     #[error("{}: is the remainder of problem {found}, not of {expected}", file.display())]
     OtherProblem { file: PathBuf, found: String, expected: String },
-    #[error("{}: was fitted to another declared arm (a fixed value, a mass, gravity or an effect has changed since); fit it again with flexcal identify --remainder", file.display())]
+    #[error("{}: was fitted to another declared arm (a nominal or fixed value, a mass, gravity or an effect has changed since); fit it again with flexcal identify --remainder", file.display())]
     OtherArm { file: PathBuf },
     #[error("{}: belongs to another estimate than {} ({parameter} differs): one of the two files is of another run; fit both again with flexcal identify --remainder", file.display(), estimate.display())]
     OtherEstimate { file: PathBuf, estimate: PathBuf, parameter: String },

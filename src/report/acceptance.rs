@@ -167,8 +167,8 @@ fn accuracy_blocks<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     };
     let bound = result.bound.as_ref().map(|bound| {
         Block::Text(format!(
-            "The fit expects {} % of the errors to stay below a bound of {} mm on average; {:.0} of the {} \
-             held-out rows do stay below theirs ({} %).{}",
+            "Each prediction has a bound that {} % of the errors should stay below ({} mm on average); \
+             {:.0} of the {} held-out rows stay below theirs ({} %).{}",
             percent_of(bound.bounds.level),
             number(bound.bounds.mean_bound_mm, 4),
             bound.coverage * bound.rows as f64,

@@ -148,11 +148,16 @@ fn head<'a>(
 /// States the held-out error with and without a remainder that is kept; `None` without one.
 fn corrected_sentence(closure: &ClosedLoop, accuracy: &PredictionAccuracy) -> Option<String> {
     let (before, after) = (&closure.after.fitted.held_out, accuracy.corrected.as_ref()?);
-    Some(format!(
-        "A remainder is kept: with it the mean held-out error is {} instead of {}.",
-        with_unit(after, after.mean.norm),
-        with_unit(before, before.mean.norm)
-    ))
+    let [with, without] = [after, before].map(|errors| with_unit(errors, errors.mean.norm));
+    Some(if after.mean.norm > before.mean.norm {
+        format!(
+            "A remainder is kept, but with it the mean held-out error rises from {without} to {with}."
+        )
+    } else {
+        format!(
+            "A remainder is kept: with it the mean held-out error is {with} instead of {without}."
+        )
+    })
 }
 
 /// Returns the cautions that concern the causes: missing declarations, influential rows, findings,
@@ -211,6 +216,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         // Without found effects, the failed tests are already listed above.
         let failed = failed.into_iter().filter(|_| !result.effects.is_empty());
         blocks.push(Block::list(unexplained.chain(failed)));
+        blocks.extend(other_reduced_chi2(&closure.residual_tests, &closure.after).map(Block::Text));
     }
     text(&blocks)
 }
@@ -298,7 +304,7 @@ fn blocks<'a>(
         figures::order(plots),
         figures::joint_map(plots),
     ]));
-    blocks.extend(other_reduced_chi2(&closure.residual_tests, &closure.after));
+    blocks.extend(other_reduced_chi2(&closure.residual_tests, &closure.after).map(Block::Text));
     blocks.extend(super::remainder::uncertainty(after, plots));
     blocks.push(Block::heading("Parameters of the final fit"));
     blocks.extend(parameters(&closure.closed, after, &file));
@@ -482,9 +488,15 @@ fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<Stri
             others.len()
         )),
     };
+    let differs = failed.first().and_then(|test| {
+        let shows_size = test.contains("χ²/ν");
+        other_reduced_chi2(&closure.residual_tests, &closure.after).filter(|_| shows_size)
+    });
+    let differs = differs.map_or_else(String::new, |sentence| format!(" {sentence}"));
     let parts: Vec<String> = structure.into_iter().chain(tests).collect();
-    (!parts.is_empty() && (result.trusted || !closure.after.names_mistake()))
-        .then(|| format!("What remains: {}. Details: -v or report.html.", parts.join("; ")))
+    (!parts.is_empty() && (result.trusted || !closure.after.names_mistake())).then(|| {
+        format!("What remains: {}.{differs} Details: -v or report.html.", parts.join("; "))
+    })
 }
 
 /// States the gain on held-out rows, and the arms that have poses without an equilibrium.

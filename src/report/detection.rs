@@ -47,8 +47,8 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     let rows: Vec<Vec<String>> =
         families.into_iter().flat_map(|family| hardest_rows(&visible, family)).collect();
     let mut blocks = vec![Block::Text(format!(
-        "Size from which on an effect is found in {:.0} of 100 such sets of measurements, for the {MAX_SHOWN_EFFECTS} least visible effects \
-         of each family:",
+        "Size from which on an effect is found in {:.0} of 100 such sets of measurements, for the least visible effect at each of the \
+         {MAX_SHOWN_EFFECTS} places of a family where it is least visible:",
         detection.power * 100.0
     ))];
     if !rows.is_empty() {

@@ -29,13 +29,13 @@ pub(crate) fn fleet(fleet: &Fleet) -> Story {
     let mut head = format!("{}: {}, {verdict}", fleet.problem, counted(fleet.arms.len(), "arm"));
     if !fleet.left_out.is_empty() {
         let names = fleet.left_out.join(", ");
-        let _ = write!(head, "\nLeft out, without a variance in some estimate: {names}");
+        let _ = write!(head, "\nLeft out, because one of the estimates gives no variance: {names}");
     }
     let parameters = fleet.parameters.iter().map(parameter).collect();
     let arms = fleet.arms.iter().map(|of| arm(of, is_judged)).collect();
-    let note = "deviations from nominal; ± 1 σ: of the mean; spread: 1 σ of the next arm about the \
-                mean, with few arms between what they show and the data sheet; data sheet: \
-                declared 1 σ";
+    let note = "deviations from nominal; ± 1 σ: of the mean; spread: expected 1 σ of the next arm about \
+                the mean; with few arms it lies between their scatter and the σ of the data sheet; \
+                data sheet: declared 1 σ";
     let blocks = vec![
         Block::lines(head),
         Block::figures([draw_arms(fleet, is_judged), draw_parameters(fleet)]),

@@ -298,7 +298,8 @@ pub(super) fn fit_details<'a>(
         figures::joint_map(plots),
     ]));
     blocks.extend(residual_tests::blocks(&plots.residual_tests));
-    blocks.extend(residual_tests::other_reduced_chi2(&plots.residual_tests, found));
+    blocks
+        .extend(residual_tests::other_reduced_chi2(&plots.residual_tests, found).map(Block::Text));
     blocks.push(Block::heading("Parameters"));
     blocks.extend(parameters(problem, found, file));
     blocks.push(Block::figures([

@@ -145,7 +145,8 @@ pub(super) fn expected_interval(found: &Identification) -> String {
 /// States the σ that the fit assumed because residuals and priors contradict the declared one, and
 /// the probable cause.
 fn other_sigma(problem: &Problem, found: &Identification) -> String {
-    if found.names_mistake() {
+    let misses = [FindingCode::OrientationMisfit, FindingCode::MissesMeasurements];
+    if found.names_mistake() || misses.iter().any(|code| found.has(*code)) {
         return "Standard errors mean nothing before the mistake that the warnings name is \
                 corrected."
             .to_owned();

@@ -28,7 +28,10 @@ pub(super) fn title(procedure: &Procedure) -> String {
         StiffnessStage::Positions => "stiffness from positions at nominal geometry",
         _ => "stiffness from load differences",
     };
-    format!("Closed forms and eq. 45 of [Chen2021], {form}, {stage} ({})", procedure.name())
+    format!(
+        "Method of [Chen2021] (stiffness in closed form, then geometry by its equation 45), {form}, {stage} ({})",
+        procedure.name()
+    )
 }
 
 /// Returns table 2: nominal value, identified value and change of each joint's geometry. Brackets

@@ -62,10 +62,13 @@ fn held_out_gain(before: &ErrorSummary, after: Option<&ErrorSummary>) -> String 
     let Some(after) = after else { return String::new() };
     let shown = |length: f64| number(length * 1e3, 4);
     let [from, to] = [before, after].map(|of| shown(of.mean.norm));
-    let mut words = if after.mean.norm > MAX_CLEAR_RATIO * before.mean.norm {
+    let ratio = after.mean.norm / before.mean.norm;
+    let mut words = if ratio <= MAX_CLEAR_RATIO {
+        format!(", that of held-out poses from {from} mm to {to} mm")
+    } else if ratio <= MAX_CLEAR_RATIO.recip() {
         format!("; that of held-out poses hardly changes ({from} mm to {to} mm)")
     } else {
-        format!(", that of held-out poses from {from} mm to {to} mm")
+        format!("; but that of held-out poses rises from {from} mm to {to} mm")
     };
     if after.max.norm > before.max.norm {
         let [from, to] = [before, after].map(|of| shown(of.max.norm));

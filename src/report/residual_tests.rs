@@ -12,10 +12,7 @@ pub(super) fn failed(tests: &ResidualTests) -> Vec<String> {
 
 /// States why the tests have another χ²/ν than the fit; `None` if both agree in the shown digits,
 /// or if no reason is known.
-pub(super) fn other_reduced_chi2(
-    tests: &ResidualTests,
-    fit: &Identification,
-) -> Option<Block<'static>> {
+pub(super) fn other_reduced_chi2(tests: &ResidualTests, fit: &Identification) -> Option<String> {
     let size = tests
         .tests
         .iter()
@@ -33,10 +30,11 @@ pub(super) fn other_reduced_chi2(
         reasons.iter().filter(|(holds, _)| *holds).map(|(_, reason)| *reason).collect();
     let differ = number(size.statistic, 2) != number(fit.reduced_chi2?, 2);
     (differ && !reasons.is_empty()).then(|| {
-        Block::Text(format!(
-            "χ²/ν of the tests differs from that of the fit, because the tests {}.",
+        format!(
+            "χ²/ν of the tests and its expected range differ from those of the fit, because the \
+             tests {}.",
             reasons.join(" and ")
-        ))
+        )
     })
 }
 

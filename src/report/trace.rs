@@ -43,7 +43,9 @@ pub fn trace(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Stor
         Block::heading("Tests of the residual (measured − predicted) of the identification poses"),
         Block::List(residual_tests::by_outcome(&trace.residual_tests)),
     ]);
-    blocks.extend(residual_tests::other_reduced_chi2(&trace.residual_tests, &trace.fit));
+    blocks.extend(
+        residual_tests::other_reduced_chi2(&trace.residual_tests, &trace.fit).map(Block::Text),
+    );
     blocks.extend(ranking(problem, &result, MAX_SHOWN_CANDIDATES, "trace.json holds them all"));
     blocks.extend(plots.map(|plots| {
         Block::figures([
@@ -224,7 +226,7 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
                 && others.any(|other| other.place == claims.place.value);
             if is_denied {
                 claims_text(claims)
-                    + " as the only cause there, because a function of unknown law acts at the same place"
+                    + " without a second cause there, but a function of unknown law acts at the same place"
             } else {
                 claims_text(claims)
             }

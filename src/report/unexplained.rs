@@ -197,7 +197,10 @@ fn structure_sentence(structure: &Structure) -> String {
             p_value(structure.p_value)
         );
     };
-    let chance = format!("p at most {} if only noise is left", p_value(structure.p_value));
+    let chance = format!(
+        "if only noise were left, such structure would have p at most {}",
+        p_value(structure.p_value)
+    );
     let law = percent(claims.law.probability);
     if let Some(limit) = &structure.limit {
         return format!(

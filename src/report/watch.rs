@@ -202,6 +202,13 @@ fn verdict(watch: &Watch) -> String {
                 cause.label
             );
         }
+        (Some(cause), _) if cause.kind == CauseKind::Row && watch.unexplained_error().is_none() => {
+            return format!(
+                "One row does not fit, seen after {}: {}",
+                counted(row, "row"),
+                named(cause)
+            );
+        }
         (Some(cause), _) if watch.unexplained_error().is_some() => {
             format!("most probable of what was tried, but not the whole: {}", named(cause))
         }
@@ -215,7 +222,7 @@ fn verdict(watch: &Watch) -> String {
 /// Returns the name of a cause, with the placement that moves the rows in the same way.
 fn named(cause: &WatchedCause) -> String {
     match &cause.alike {
-        Some(alike) => format!("{} (or {alike} moved alike)", cause.label),
+        Some(alike) => format!("{} (or {alike}, whose move looks the same)", cause.label),
         None => cause.label.clone(),
     }
 }

@@ -163,7 +163,7 @@ pub(super) const NOWHERE: &str = "nowhere in particular";
 /// Returns the name of a place in result files with its preposition: "at joint 2", "at the base".
 pub(crate) fn at_place(place: &str) -> String {
     match place {
-        NOWHERE => "at a place that the tests do not show".to_owned(),
+        NOWHERE => "at a place that is not known".to_owned(),
         joint if joint.starts_with("joint ") => format!("at {joint}"),
         other => format!("at the {other}"),
     }

@@ -158,7 +158,13 @@ fn spoiled_ones() -> Vec<Case> {
         case
     };
     vec![
-        mistyped(spoiled("a mistyped length", priors, 1, "(600 mm with one other digit?)", |_| ())),
+        mistyped(spoiled(
+            "a mistyped length",
+            priors,
+            1,
+            "(was 600 mm meant, and one digit mistyped?)",
+            |_| (),
+        )),
         spoiled("nothing wrong", priors, 0, "explains the data", |_| ()),
         spoiled("held-out rows shifted", priors, 1, "held-out", |data| {
             positions(data)[60..].rotate_left(1);

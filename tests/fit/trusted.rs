@@ -258,7 +258,7 @@ fn exchanged_rows_and_lengths_columns_moved_on_and_one_axis_in_metres_are_named(
         // What follows from the misreading has no remedy of its own.
         for code in [FindingCode::HeldOutNotBetter, FindingCode::HeldOutBeyondPrediction] {
             let follows = found.finding(code);
-            assert!(follows.is_none_or(|of| of.remedy.contains("another finding (misread)")));
+            assert!(follows.is_none_or(|of| of.remedy.contains("another warning names")));
         }
     };
     let (problem, data) = based();

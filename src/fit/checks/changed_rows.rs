@@ -463,9 +463,9 @@ fn described(fit: &CheckedFit, columns: &[usize], step: &Step) -> (String, Strin
             )
         }
         Place::Arm => (
-            "the arm is another one".to_owned(),
+            "the arm or its set-up seems to be another one".to_owned(),
             "the rows before and after fit by themselves, but not together: check whether they \
-             are of one arm with one set-up, and fit them by themselves"
+             are of one arm, one set-up and one scale of the instrument, and fit them by themselves"
                 .to_owned(),
         ),
     }

@@ -168,7 +168,7 @@ fn joint_entry(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> Cont
         rounded(declared)
     );
     let digits = typing_error(declared, fitted).map_or_else(String::new, |(meant, how)| {
-        format!(" ({}{gap}{symbol} with {how}?)", rounded(meant))
+        format!(" (was {}{gap}{symbol} meant, {how}?)", rounded(meant))
     });
     let remedy = format!(
         "if the entry is mistyped{digits}, correct it; if it is right, check the columns and axes, \
@@ -264,7 +264,7 @@ fn rotation_entry(declared: Vector3<f64>, fitted: Vector3<f64>, left: &str) -> C
 }
 
 /// Formats a number with at most six decimals, without those that the conversion of units added.
-fn rounded(value: f64) -> String {
+pub(super) fn rounded(value: f64) -> String {
     ((value * 1e6).round() / 1e6 + 0.0).to_string()
 }
 
@@ -281,7 +281,7 @@ fn typing_error(declared: f64, fitted: f64) -> Option<(f64, &'static str)> {
         let first = if is_digit(place - 1) { place - 1 } else { place.checked_sub(2)? };
         let mut changed = digits.clone();
         (is_digit(first) && is_digit(place)).then(|| changed.swap(first, place))?;
-        Some((changed, "two digits exchanged"))
+        Some((changed, "and two digits exchanged"))
     });
     // A change of the last digit comes near almost any fitted number, so it is not tried.
     let last = (0..digits.len()).rev().find(|&place| is_digit(place)).unwrap_or(0);
@@ -290,7 +290,7 @@ fn typing_error(declared: f64, fitted: f64) -> Option<(f64, &'static str)> {
         (b'0'..=b'9').map(move |digit| {
             let mut changed = digits.clone();
             changed[place] = digit;
-            (changed, "one other digit")
+            (changed, "and one digit mistyped")
         })
     });
     let near = |(changed, how): (Vec<u8>, &'static str)| {

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 
 use super::checked_fit::{Check, CheckedFit};
+use super::contradicted_entry::rounded;
 use super::finding::{Finding, FindingCode};
 use super::followed_commands::{Neighbour, Relation, Unrelated, unrelated};
 use super::misfit::Misfit;
@@ -123,14 +124,12 @@ fn filled_or_frozen(fit: &CheckedFit, before: f64) -> Option<Finding> {
         let (name, place) = (column_name(rows, joint), rows.location(from + 1));
         let is_turning = fit.problem.joints[joint].command_kind() == JointKind::Revolute;
         let shown = |value: f64| {
-            if is_turning {
-                format!("{:.6}°", value.to_degrees())
-            } else {
-                format!("{:.6} mm", value * 1e3)
-            }
+            let (size, unit) =
+                if is_turning { (value.to_degrees(), "°") } else { (value * 1e3, " mm") };
+            format!("{}{unit}", rounded(size))
         };
         let how = if last.abs() <= 1e-12 {
-            format!("stays at {} from {place} on, as a log that froze", shown(values[from]))
+            format!("stays at {} from {place} on, as if the log had frozen", shown(values[from]))
         } else {
             format!("rises by {} a row from {place} on, as a spreadsheet fills cells", shown(last))
         };
@@ -174,7 +173,7 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
             "each of its numbers belongs to the row after".to_owned()
         }
         Some(Relation::Held(run)) => {
-            format!("it holds one number {}, as a log that froze", in_rows(rows, run))
+            format!("it holds one number {}, as if the log had frozen", in_rows(rows, run))
         }
         Some(Relation::Offset(run, by)) => {
             let size = if by > 0.0 { "small" } else { "large" };

@@ -112,8 +112,8 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         format!("the rows {}{more}", shown.join(", "))
     };
     let text = format!(
-        "{listed} ({} of {}) contradict the others, which the nominal arm misses by {} instead of {}: \
-         {cause}",
+        "{listed} ({} of {}) contradict the others: without them the nominal arm misses by {} instead of \
+         {}; {cause}",
         apart.len(),
         rows.len(),
         format_error("position", after, 3),

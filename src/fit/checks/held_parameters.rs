@@ -174,7 +174,7 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
     let [it, they_are, deviate, their] = if is_single {
         ["it", "it is", "it deviates", "is held at its nominal value"]
     } else {
-        ["them", "they are", "they deviate", "are held at their nominal values"]
+        ["this pair", "they are", "they deviate", "are held at their nominal values"]
     };
     let others = match alike.as_slice() {
         [] => String::new(),

@@ -195,20 +195,15 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         state_explanations(&mut findings);
     }
     // Where the input is wrong, advice on poses, priors or σ would lead away from the mistake.
-    let mistake = MISTAKES.iter().find(|code| findings.iter().any(|found| found.code == **code));
-    if let Some(mistake) = mistake {
-        let remedy = format!(
-            "correct first the mistake that another finding ({}) names",
-            mistake.entry().code
-        );
+    if findings.iter().any(|found| MISTAKES.contains(&found.code)) {
+        let remedy = "correct first the mistake that another warning names";
         let is_consequence = |found: &&mut Finding| {
             CONSEQUENCES.contains(&found.code)
                 && (cause_text.is_none() || !OF_MISFIT.contains(&found.code))
                 || found.code == FindingCode::NominalFarOff
-                    && *mistake == FindingCode::ColumnDoubted
         };
         for finding in findings.iter_mut().filter(is_consequence) {
-            *finding = finding.clone().with_remedy(remedy.clone());
+            *finding = finding.clone().with_remedy(remedy.to_owned());
         }
     } else if cause_text.is_none() {
         let remedy = if fit.ignores_elasticity() {
@@ -280,14 +275,21 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
     let (is_far_off, is_beyond_noise) = (has(&FAR_OFF), has(&BEYOND_NOISE));
     let has_cause = has(&[FindingCode::RowsSetAside]);
     let is_beyond_prior = has(&[FindingCode::BeyondPrior]);
+    let names_mistake = |found: &Finding| {
+        found.code == FindingCode::HeldOutMissed && found.remedy != found.code.entry().remedy
+    };
+    let are_held_out_wrong = findings.iter().any(names_mistake);
     for finding in findings {
         // Remedies that name a cause stay.
         if finding.remedy != finding.code.entry().remedy {
             continue;
         }
         let remedy = match finding.code {
+            FindingCode::HeldOutBeyondPrediction if are_held_out_wrong => {
+                "correct first the held-out rows that another warning names"
+            }
             FindingCode::HeldOutBeyondPrediction if is_beyond_prior => {
-                "follow first what another finding (beyond-prior) says"
+                "follow first the warning on the parameter that is far beyond its prior"
             }
             FindingCode::HeldOutWorse
             | FindingCode::HeldOutNotBetter

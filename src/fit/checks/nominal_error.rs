@@ -18,6 +18,8 @@ pub(super) const MAX_NOMINAL_MISS: f64 = 0.1;
 /// measurements, at which the misreading explains its error: nominal arms are wrong by about as
 /// much.
 const MAX_EXPLAINED_MISS: f64 = 0.02;
+/// Largest ratio that is stated in per cent.
+const MAX_PERCENTAGE: f64 = 2.0;
 /// Smallest spread of the predicted targets of contacts, relative to the arm's reach, with which
 /// the error is compared. If it is smaller, all contacts are at one place, and the spread is only
 /// the arm's error.
@@ -141,16 +143,23 @@ fn far_off_finding(
         return Finding::new(FindingCode::NominalFarOff, numbers, text.to_owned())
             .with_remedy("check their units".to_owned());
     }
-    let (what, by, part) = (quantity_noun(kind), format_error(kind, rms, 1), 100.0 * rms / spread);
+    let (what, by, part) = (quantity_noun(kind), format_error(kind, rms, 1), rms / spread);
+    let part = if part < MAX_PERCENTAGE {
+        format!("{:.0} % of", 100.0 * part)
+    } else {
+        format!("{part:.0} times")
+    };
     let standing = match kind {
         "position" if is_base_free => ", wherever its base stands",
-        "position" => " with its base where the problem holds it",
+        "position" => ", with its base where the problem holds it",
         _ => "",
     };
-    let text =
-        format!("the nominal arm misses the {what} by {by}, {part:.0} % of their spread{standing}");
+    let text = format!("the nominal arm misses the {what} by {by}, {part} their spread{standing}");
     let finding = Finding::new(FindingCode::NominalFarOff, numbers, text);
     match words.is_empty() {
+        false if !left.is_finite() => {
+            finding.with_remedy(format!("check first for {}", first_of(&words)))
+        }
         false => {
             let effect = if left <= MAX_EXPLAINED_MISS * spread {
                 "explain it".to_owned()

@@ -51,11 +51,11 @@ pub fn pose_sheet<'a>(
     sheet([&["row", "held_out"], columns].concat(), rows.into_iter().map(cells))
 }
 
-/// Returns the sentence of a caption on poses that are not drawn, such as " 300 of 6487 poses are
+/// Returns the sentence of a caption on poses that are not drawn, such as " 300 of 6487 rows are
 /// drawn, including those with the largest residuals." Returns an empty text if all are drawn.
 pub fn thinning_note(drawn: usize, total: usize) -> String {
     if drawn < total {
-        format!(" {drawn} of {total} poses are drawn, including those with the largest residuals.")
+        format!(" {drawn} of {total} rows are drawn, including those with the largest residuals.")
     } else {
         String::new()
     }

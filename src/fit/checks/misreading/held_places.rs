@@ -33,7 +33,7 @@ impl Misreading {
                 let [found] = targets.as_slice() else { return String::new() };
                 let mistake = mistaken_target(problem.tool.target, *found);
                 let mistake = mistake.map_or_else(String::new, |said| format!("; {said}"));
-                format!("; it is at target_m = [{}]{mistake}", numbers(found, 1.0))
+                format!(", at target_m = [{}]{mistake}", numbers(found, 1.0))
             }
             _ => String::new(),
         }

@@ -15,9 +15,14 @@ use crate::problem::{Fixture, JointKind, Problem};
 /// Returns the name of an entry of the joint table, such as `alpha of joint 3`; `joint` is 0 for
 /// all joints.
 fn entry_name(joint: usize, field: JointField) -> String {
+    let name = match field {
+        JointField::A => "the length a",
+        JointField::D => "the offset d",
+        _ => field.name(),
+    };
     match joint {
-        0 => format!("{} of all joints", field.name()),
-        _ => format!("{} of joint {joint}", field.name()),
+        0 => format!("{name} of all joints"),
+        _ => format!("{name} of joint {joint}"),
     }
 }
 
