@@ -97,13 +97,18 @@ impl Common {
 
     /// Reads the problem, with the joint tables of `--joints` instead of those it names.
     pub fn read_problem(&self) -> Result<Problem, Box<dyn Error>> {
-        let mut problem = Problem::read(self.problem())?;
+        Ok(self.read_problem_with_text()?.0)
+    }
+
+    /// Does the same as [`read_problem`](Self::read_problem), and returns the text of the file.
+    pub fn read_problem_with_text(&self) -> Result<(Problem, String), Box<dyn Error>> {
+        let (mut problem, text) = Problem::read_with_text(self.problem())?;
         if !self.joints.is_empty() {
             let log = problem.data.joint_log.as_mut();
             let log = log.ok_or_else(|| NothingToJoin { file: self.problem_file() })?;
             (log.files, log.is_given) = (self.joints.clone(), true);
         }
-        Ok(problem)
+        Ok((problem, text.to_string()))
     }
 
     /// Reads the measurement files with `read` and prints the warnings. If they cannot be read

@@ -41,7 +41,7 @@ pub struct Arguments {
 /// `remainder.json` if a remainder is accepted.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let (problem, text) = Problem::read_with_text(common.problem())?;
+    let (problem, text) = common.read_problem_with_text()?;
     common.files(&problem).iter().try_for_each(|file| check_data_file(file))?;
     let texts = ["loop.json", "problem.closed.toml", "residuals.csv", REMAINDER_FILE];
     let names = [&texts[..], &REPORT].concat();

@@ -135,7 +135,7 @@ pub enum WarningKind {
     DateOrderAssumed { value: String, read: String, is_day_first: bool },
     #[error(
         "its clock differs from that of the measurements: rows are paired with offset_s = \
-         {offset}{tolerance}; check that these are the rows of the same hour"
+         {offset}{tolerance}, with which they agree; check that both tables are of one measurement"
     )]
     ClockOffsetFound { offset: String, tolerance: String },
     #[error(

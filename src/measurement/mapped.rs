@@ -46,6 +46,11 @@ impl<'a> Names<'a> {
             ColumnSelector::Place(_) => !has(&rule.ours),
             ColumnSelector::File => rules.len() == 1,
         };
+        // A table whose joints and positions have flexcal's names needs no other column of the map, and
+        // its clock has flexcal's name too.
+        let mut of_arm = rules.iter().filter(|rule| is_joint(rule) || is_position(rule)).peekable();
+        let is_ours =
+            of_arm.peek().is_some() && of_arm.all(|rule| has(&rule.ours) && !is_foreign(&rule));
         if !rules.iter().any(|rule| is_foreign(&rule)) {
             // The clocks of a joint table may need other rules.
             let is_of_clock =
@@ -67,6 +72,7 @@ impl<'a> Names<'a> {
         for rule in rules {
             let place = match &rule.theirs {
                 ColumnSelector::File => continue,
+                _ if is_ours && is_clock(&rule.ours) => continue,
                 ColumnSelector::Place(number) => {
                     Some(number - 1).filter(|place| *place < of_place.len())
                 }
@@ -75,7 +81,7 @@ impl<'a> Names<'a> {
             let Some(entry) = place.and_then(|place| of_place.get_mut(place)) else {
                 // The join has used the clock of the joint table, which stands in no row.
                 let is_clock = table.appended_columns().is_some() && is_clock(&rule.ours);
-                if !measured || has(&rule.ours) || is_given_otherwise(rule) || is_clock {
+                if !measured || is_ours || has(&rule.ours) || is_given_otherwise(rule) || is_clock {
                     continue;
                 }
                 return Err(no_such(rule, rules, table));

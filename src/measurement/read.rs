@@ -86,20 +86,23 @@ impl Measurements {
         Self::read_column_table(table, problem, Use::Planned)
     }
 
-    /// Reads files for a purpose. If the joint tables are given with them, the declared offset is not
-    /// theirs: rows are paired with the one that is found, and a warning states it.
+    /// Reads files for a purpose. If no offset of the clocks is declared, or if the joint tables are
+    /// given with the files, so that the declared one is not theirs, rows are paired with the offset
+    /// that is found, and a warning states it.
     fn read_table(
         files: &[PathBuf],
         problem: &Problem,
         table_use: Use,
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let as_declared = Self::read_files(files, problem, table_use);
-        let given = problem.data.joint_log.as_ref().filter(|log| log.is_given);
+        let is_open =
+            |log: &&JointLog| log.is_given || log.by.has_no_offset() && files == problem.data.files;
+        let open = problem.data.joint_log.as_ref().filter(is_open);
         let found = as_declared.as_ref().err().and_then(|error| match &*error.kind {
             InputErrorKind::Table(kind) => kind.clock_offset(),
             _ => None,
         });
-        let Some((log, found)) = given.zip(found) else { return as_declared };
+        let Some((log, found)) = open.zip(found) else { return as_declared };
         let Some(by) = log.by.moved_to(found) else { return as_declared };
         let mut moved = problem.clone();
         moved.data.joint_log = Some(JointLog { by, ..log.clone() });

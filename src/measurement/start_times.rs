@@ -21,12 +21,17 @@ impl StartTimes {
         if self.sessions.is_empty() { Some(self.first) } else { self.sessions.get(name).copied() }
     }
 
+    /// Returns true if times are dates, not seconds of a clock with its own zero.
+    pub(crate) fn are_dates(&self) -> bool {
+        self.first >= FIRST_DATE
+    }
+
     /// Returns the days from the first pose of these sessions to the first of `rows`; `None` unless
     /// both have dates.
     #[doc(hidden)]
     pub fn days_until(&self, rows: &Measurements) -> Option<f64> {
         let later = rows.start_times().first - self.first;
-        (rows.has_dates() && self.first >= FIRST_DATE).then_some(later / 86_400.0)
+        (rows.has_dates() && self.are_dates()).then_some(later / 86_400.0)
     }
 }
 

@@ -55,6 +55,11 @@ pub enum JoinRule {
 const MAX_FOUND_OFFSET: f64 = 86_400.0;
 
 impl JoinRule {
+    /// Returns true if rows are joined by time and no offset of the clocks is declared.
+    pub(crate) fn has_no_offset(self) -> bool {
+        matches!(self, Self::Time { offset, .. } if offset == 0.0)
+    }
+
     /// Returns the rule with the offset of the clocks that an error states, and with its assignment of
     /// a larger tolerance unless that is empty; `None` for rows that are not joined by time.
     pub(crate) fn moved_to(self, [offset, tolerance]: &[String; 2]) -> Option<Self> {

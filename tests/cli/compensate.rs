@@ -328,6 +328,30 @@ fn errors_of_the_instrument_are_no_errors_of_the_arm() {
 }
 
 #[test]
+fn poses_without_a_time_are_taken_at_the_start_of_the_measurements() {
+    let folder = Folder::with_lunar_sampler();
+    folder.map("problem.toml", |text| format!("{text}\n[[effect]]\ntracker-drift = true\n"));
+    let table = folder.table("a-none.csv");
+    let place = table.place("time_s");
+    let with_dates = |row: &Vec<String>| {
+        let mut row = row.clone();
+        row[place] = (1_773_219_600.0 + row[place].parse::<f64>().unwrap()).to_string();
+        row.join(",")
+    };
+    let timed: Vec<String> = table.rows.iter().map(with_dates).collect();
+    let header = folder.read("a-none.csv").lines().next().unwrap().to_owned();
+    folder.write("a-none.csv", format!("{header}\n{}\n", timed.join("\n")));
+    folder.flexcal("identify . --out out");
+    let header = header.replace("time_s", "note");
+    folder.write("poses.csv", format!("{header}\n{}\n", timed.join("\n")));
+    let run = folder.flexcal("predict . --estimate out/estimate.json --data poses.csv --out p");
+    assert_contains(&run.stderr, &["no column time, and tracker-drift depends on it"]);
+    let [found, table] = ["p/predictions.csv", "poses.csv"].map(|name| folder.table(name));
+    let [predicted, measured] = [found.numbers("predicted_x_mm"), table.numbers("x_mm")];
+    assert!(predicted.iter().zip(&measured).all(|(x, there)| (x - there).abs() < 10.0));
+}
+
+#[test]
 fn bounds_of_commands_hold_whichever_effect_acts() {
     let folder = Folder::with_lunar_sampler();
     let text = folder.read("problem.toml") + "\n[[effect]]\ntracker-scale = true\n";

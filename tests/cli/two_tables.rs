@@ -61,6 +61,10 @@ fn every_command_reads_two_tables_and_what_flexcal_writes_for_them() {
     let folder = two_tables();
     let run = folder.flexcal("identify . --out fitted").success();
     assert!(!run.stderr.contains("Stamp"), "{run:?}");
+    for command in ["identify", "loop"] {
+        let other = folder.flexcal(&format!("{command} . --joints other.csv --out other")).code(2);
+        assert_contains(&other.stderr, &["other.csv", "no such file"]);
+    }
     // A plan lacks what the log has; the next command says so, and runs once it is added.
     let candidates = log(&folder, &[&JOINTS[..], &CONDITIONS[..2]].concat(), 30);
     folder.write("candidates.csv", candidates);

@@ -197,7 +197,7 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
 }
 
 #[test]
-fn clocks_that_differ_are_refused_with_the_offset() {
+fn clocks_that_differ_are_told_with_the_offset() {
     let times: Vec<f64> = (0..20).map(|k| f64::from(8 * k) + f64::from(k * k % 31) / 4.0).collect();
     let log = |times: &[f64]| {
         let row = |time: &f64| format!("{time},{},0\n", time / 9.0);
@@ -209,12 +209,19 @@ fn clocks_that_differ_are_refused_with_the_offset() {
     };
     let read = |by: &str, shift: f64| joined(by, &tracker(shift), &log(&times));
     let offset = "write offset_s = 47.0 in joints";
-    let most = read("by = 'time'", 47.0).unwrap_err();
+    let most = read("by = 'time', offset_s = 1", 47.0).unwrap_err();
     assert_says(&most, &["of 20 measured rows have no partner", offset]);
-    let wide = read("by = 'time', tolerance_s = 60", 47.0).unwrap_err();
+    let wide = read("by = 'time', tolerance_s = 60, offset_s = 1", 47.0).unwrap_err();
     assert_says(&wide, &["problem.toml", offset]);
-    let far = read("by = 'time', tolerance_s = 9999", 3600.0).unwrap_err();
+    let far = read("by = 'time', tolerance_s = 9999, offset_s = 1", 3600.0).unwrap_err();
     assert_says(&far, &["20 of 20 measured rows have the same partner", "offset_s = 3600.0"]);
+    for (by, shift, found) in [("", 47.0, "47.0"), (", tolerance_s = 9999", 3600.0, "3600.0")] {
+        let (rows, warnings) = read(&format!("by = 'time'{by}"), shift).unwrap();
+        assert_eq!(rows.len(), 20);
+        assert_eq!(warnings.len(), 1);
+        let found = format!("rows are paired with offset_s = {found}");
+        assert!(warnings[0].to_string().contains(&found), "{}", warnings[0]);
+    }
     let (rows, warnings) = read("by = 'time', offset_s = 47", 47.0).unwrap();
     assert_eq!((rows.len(), warnings), (20, Vec::new()));
     let thrice: Vec<f64> = times.iter().flat_map(|time| [time - 0.1, *time, time + 0.1]).collect();

@@ -57,7 +57,23 @@ pub(crate) fn missing_loads(
              taken in every row: add the column if {other}"
         ))
     };
-    lacking.filter_map(sentence).collect()
+    lacking.filter_map(sentence).chain(missing_time(problem, estimate, rows)).collect()
+}
+
+/// Returns a sentence if `rows` lack times, the rows of `estimate` had dates, and an effect depends on
+/// time.
+fn missing_time(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+    rows: &Measurements,
+) -> Option<String> {
+    let lacks = !rows.time_measured && estimate.start_times.as_ref()?.are_dates();
+    let effect = problem.effects.iter().find(|of| of.effect.follows_time()).filter(|_| lacks)?;
+    Some(format!(
+        "the table has no column time, and {} depends on it: every row is taken as measured at the \
+         start of the measurements of the estimate; add the column if that is not meant",
+        effect.effect.name()
+    ))
 }
 
 /// Returns the identified relative error of measured lengths; `None` if the problem declares no

@@ -24,6 +24,8 @@ pub struct Placement {
     pub targets: Vec<String>,
     base_of_row: Vec<usize>,
     target_of_row: Vec<usize>,
+    /// True if times were measured; otherwise they are the numbers of the rows.
+    is_timed: bool,
 }
 
 impl Placement {
@@ -36,6 +38,7 @@ impl Placement {
             targets: target.names.clone(),
             base_of_row: session.of_row.clone(),
             target_of_row: target.of_row.clone(),
+            is_timed: measurements.time_measured,
         }
     }
 
@@ -80,9 +83,12 @@ impl Placement {
     }
 
     /// Sets the elapsed times of `poses` to those since the start of their session in an earlier
-    /// table. Poses of sessions without an earlier start keep the time since the first pose of
-    /// their session.
+    /// table. Poses without a time, or of sessions without an earlier start, keep the time since the
+    /// first pose of their session.
     pub(crate) fn count_time_from(&self, starts: &StartTimes, poses: &mut [Pose]) {
+        if !self.is_timed && starts.are_dates() {
+            return;
+        }
         let starts: Vec<Option<f64>> =
             self.bases.iter().map(|session| starts.of_session(session)).collect();
         for pose in poses {

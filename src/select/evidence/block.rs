@@ -183,10 +183,11 @@ impl Block {
     /// probability, and the prior on its coefficients. The components of all columns along the
     /// fitted parameters are computed in one product, which is faster.
     pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
+        let Some((design, ..)) = designs.first() else { return Vec::new() };
+        let rows = design.values().nrows();
         let dense = designs.iter().filter_map(|(design, ..)| {
             if let Design::Dense(columns) = design { Some(columns) } else { None }
         });
-        let rows = designs.first().map_or(0, |(design, ..)| design.values().nrows());
         let mut dense_columns = DMatrix::zeros(rows, dense.clone().map(DMatrix::ncols).sum());
         let columns = dense.flat_map(DMatrix::column_iter);
         dense_columns
@@ -369,6 +370,7 @@ mod tests {
             active: DMatrix::zeros(0, 4),
         };
         let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
+        assert!(Block::all(Vec::new(), &fit).is_empty());
         let (within, grid) = (
             fit.projected_out(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2,
             Noise { freedom: 30.0, ln_half_width: 0.1, min_ln_factor: 0.0 }.grid(),
