@@ -17,7 +17,7 @@ from ._forward import Forward
 from ._least_squares import LeastSquares
 from ._progress import Told, told
 from ._restored import Spec
-from ._sections import HeldOut, toml_held_out, toml_number, with_data
+from ._sections import HeldOut, toml_held_out, toml_number, toml_point, with_keys
 from ._tables import Data, Path, Source, asked, count, region, source, warn
 from .errors import InputError
 
@@ -84,6 +84,10 @@ class Problem(Forward):
         *,
         position_sigma_mm: float | None = None,
         held_out: HeldOut | None = None,
+        target_m: Sequence[float] | None = None,
+        payload_kg: float | None = None,
+        payload_at_m: Sequence[float] | None = None,
+        reference_temperature_C: float | None = None,
     ) -> Problem:
         """The chain between two links of a URDF, as ``flexcal init`` writes it (docs/urdf.md).
 
@@ -102,6 +106,12 @@ class Problem(Forward):
             1 σ of a coordinate that your instrument measures; a guess, if it is not given.
         held_out
             Rows that judge and are not fitted: ``"none"``, their fraction, or the name of a session.
+        target_m
+            Where the measured point sits in the frame of the tip, roughly; its origin, if it is not given.
+        payload_kg, payload_at_m
+            Mass that the hand carries in all rows, and its centre in the frame of the tip.
+        reference_temperature_C
+            Temperature at which the arm has its nominal size: effects of a column ``temperature_C`` are sought about it.
 
         Raises
         ------
@@ -114,12 +124,21 @@ class Problem(Forward):
             raise InputError(f"path: the path of a URDF is needed, not its text ({start} …); write the text to a file first", key="path")
         core = _core.Problem.from_urdf(path, base, tip, TEXT)
         given: dict[str, str] = {}
+        tool: dict[str, str] = {}
+        if target_m is not None:
+            tool["target_m"] = toml_point("target_m", target_m)
+        if payload_kg is not None:
+            tool["payload_kg"] = toml_number("payload_kg", payload_kg)
+        if payload_at_m is not None:
+            tool["payload_at_m"] = toml_point("payload_at_m", payload_at_m)
+        if reference_temperature_C is not None:
+            given["reference_temperature_C"] = repr(float(reference_temperature_C))
         if position_sigma_mm is not None:
             given["position_sigma_mm"] = toml_number("position_sigma_mm", position_sigma_mm)
         if held_out is not None:
             given["held_out"] = toml_held_out(held_out)
-        notes = [*core.notes, *(note for key, note in FILL_IN.items() if key not in given)]
-        return _parsed(with_data(core.text, given), TEXT, notes)
+        notes = [*core.notes, *(note for key, note in FILL_IN.items() if key not in given | tool)]
+        return _parsed(with_keys(with_keys(core.text, "data", given), "tool", tool), TEXT, notes)
 
     def _hold(self, core: _core.Problem) -> None:
         self._core = core
@@ -211,7 +230,7 @@ class Problem(Forward):
             A mistake in the measurements; problem, data, strategy and solver do not fit each other.
         """
         if held_out is not None:
-            text = with_data(self._core.text, {"held_out": toml_held_out(held_out)})
+            text = with_keys(self._core.text, "data", {"held_out": toml_held_out(held_out)})
             return _parsed(text, str(self._core.file), self._core.notes).identify(
                 data, strategy, solver, remainder=remainder, prior=prior, drift_days=drift_days, progress=progress
             )

@@ -1,10 +1,13 @@
-"""Keys of ``[data]`` in the text of a problem."""
+"""Keys of a section in the text of a problem."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from typing import Literal, TypeAlias
+
+import numpy as np
 
 from .errors import InputError
 
@@ -34,22 +37,30 @@ def toml_held_out(held_out: HeldOut) -> str:
     )
 
 
-def with_data(text: str, values: dict[str, str]) -> str:
-    """The text of a problem with other values of keys of ``[data]``, each of which stands on a line of its own or is added."""
+def toml_point(name: str, point: Sequence[float]) -> str:
+    """Three coordinates as TOML."""
+    values = np.asarray(point, dtype=float)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise InputError(f"{name}: three finite numbers are needed, x, y, z, not {point!r}", key=name)
+    return repr(values.tolist())
+
+
+def with_keys(text: str, section: str, values: dict[str, str]) -> str:
+    """The text of a problem with other values of keys of a section, each of which stands on a line of its own or is added."""
     for key, value in values.items():
-        head = re.search(r"^[ \t]*\[[ \t]*data[ \t]*\][ \t]*(#.*)?\r?$", text, re.MULTILINE)
-        if re.search(rf"^[ \t]*\[[ \t]*data[ \t]*\.[ \t]*\"?{key}\"?[ \t]*\]", text, re.MULTILINE):
-            raise InputError(f"{key}: the problem has a section [data.{key}]; change it there", key=key)
-        dotted = re.search(rf"^[ \t]*data\.{key}[ \t]*=", text, re.MULTILINE)
+        head = re.search(rf"^[ \t]*\[[ \t]*{section}[ \t]*\][ \t]*(#.*)?\r?$", text, re.MULTILINE)
+        if re.search(rf"^[ \t]*\[[ \t]*{section}[ \t]*\.[ \t]*\"?{key}\"?[ \t]*\]", text, re.MULTILINE):
+            raise InputError(f"{key}: the problem has a section [{section}.{key}]; change it there", key=key)
+        dotted = re.search(rf"^[ \t]*{section}\.{key}[ \t]*=", text, re.MULTILINE)
         if dotted:
             start, end = dotted.start(), len(text)
         elif head:
             after = re.search(r"^[ \t]*\[", text[head.end() :], re.MULTILINE)
             start, end = head.end(), head.end() + after.start() if after else len(text)
         else:
-            raise InputError(f"{key}: the problem has no section [data] in which it could be written", key=key)
+            raise InputError(f"{key}: the problem has no section [{section}] in which it could be written", key=key)
         part = text[start:end]
-        line = rf"^([ \t]*(?:data\.)?\"?{key}\"?[ \t]*=[ \t]*)[^#\n]*?([ \t]*(?:#.*)?\r?)$"
+        line = rf"^([ \t]*(?:{section}\.)?\"?{key}\"?[ \t]*=[ \t]*)[^#\n]*?([ \t]*(?:#.*)?\r?)$"
         part, count = re.subn(line, lambda found: found[1] + value + found[2], part, count=1, flags=re.MULTILINE)
         if count == 0:
             part = f"\n{key} = {value}{part}"

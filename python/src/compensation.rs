@@ -113,6 +113,17 @@ impl Compensation {
             found.map_err(|error: CompensationError| raised(&error))?;
         warnings.extend(misplaced.into_iter().chain(others));
         warnings.extend(report::undecided_commands(&found, &rivals).map(|(said, _)| said));
+        let unreached: Vec<usize> =
+            found.commands.iter().filter(|of| !of.is_reached()).map(|of| of.row).collect();
+        if let [first, ..] = unreached.as_slice() {
+            warnings.push(format!(
+                "{} of {} targets are out of reach, the first in row {} of the targets: their commands \
+                 are NaN",
+                unreached.len(),
+                found.commands.len(),
+                first + 1
+            ));
+        }
         if found.is_base_open {
             warnings.push(
                 "the estimate does not know where the arm's base is in the measuring frame, so targets \

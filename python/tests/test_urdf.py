@@ -105,6 +105,13 @@ def test_sigma_and_held_out_rows_are_arguments(tmp_path: Path) -> None:
             problem.identify(held_out=wrong)
     with pytest.raises(flexcal.InputError, match="is not above 0"):
         flexcal.Problem.from_urdf(bench / "arm.urdf", position_sigma_mm=-1.0)
+    load = {"target_m": (0.01, 0, 0.2), "payload_kg": 4, "payload_at_m": np.array([0, 0, 0.1]), "reference_temperature_C": 21}
+    loaded = flexcal.Problem.from_urdf(bench / "arm.urdf", **load)  # type: ignore[arg-type]
+    for line in ("target_m = [0.01, 0.0, 0.2] ", "payload_kg = 4.0", "payload_at_m = [0.0, 0.0, 0.1]", "reference_temperature_C = 21.0"):
+        assert line in loaded.text
+    assert not any("target_m" in note for note in loaded.notes)
+    with pytest.raises(flexcal.InputError, match="target_m: three finite numbers"):
+        flexcal.Problem.from_urdf(bench / "arm.urdf", target_m=(0.0, 1.0))
     inline = flexcal.Problem("name = 'a'\n[[joint]]\na_m = 0.5\n")
     with pytest.raises(flexcal.InputError, match=r"no section \[data\]"):
         inline.identify(held_out="none")
