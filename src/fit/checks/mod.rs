@@ -280,12 +280,20 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
     let (is_far_off, is_beyond_noise) = (has(&FAR_OFF), has(&BEYOND_NOISE));
     let has_cause = has(&[FindingCode::RowsSetAside]);
     let is_beyond_prior = has(&[FindingCode::BeyondPrior]);
+    // Names of fixtures stand in brackets.
+    let is_of_fixture = findings.iter().any(|found| {
+        found.code == FindingCode::BeyondPrior
+            && found.word("parameter").is_some_and(|name| name.contains('['))
+    });
     for finding in findings {
         // Remedies that name a cause stay.
         if finding.remedy != finding.code.entry().remedy {
             continue;
         }
         let remedy = match finding.code {
+            FindingCode::NominalFarOff if is_of_fixture => {
+                "follow first what another finding (beyond-prior) says"
+            }
             FindingCode::HeldOutBeyondPrediction if is_beyond_prior => {
                 "follow first what another finding (beyond-prior) says"
             }
