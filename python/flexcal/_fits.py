@@ -286,7 +286,7 @@ class Identification(Fit, Forward):
         """
         joints = self._problem.joints
         try:
-            core = asked(lambda given: self._core.compensate(given, frame, level), source(targets, joints))
+            core = asked(lambda given: self._core.compensate(given, frame, level), source(targets, joints, "targets"))
         except InputError as error:
             column = (error.key or "").removeprefix("column ")
             if "missing" not in str(error) or not (re.fullmatch(r"q\d+", column) or column in joints):

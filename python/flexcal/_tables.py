@@ -38,13 +38,13 @@ Region: TypeAlias = tuple[list[float] | None, list[list[float]]]
 Source: TypeAlias = list[Path] | tuple[str, list[tuple[str, Column]]]
 
 
-def source(data: Data, joints: Sequence[str]) -> Source:
+def source(data: Data, joints: Sequence[str], argument: str = "data") -> Source:
     """What the reader takes: files, or the name of a table and its columns. ``joints`` are the names of the arm's joints."""
     if isinstance(data, (str, os.PathLike)):
         return [data]
     if isinstance(data, (list, tuple)) and data and all(isinstance(file, (str, os.PathLike)) for file in data):
         return list(data)
-    columns = [part for name, values in _columns(data) for part in _split(str(name), values, joints)]
+    columns = [part for name, values in _columns(data, argument) for part in _split(str(name), values, joints)]
     if not columns:
         raise InputError("data: no columns; give a table with columns such as q1_deg, x_mm, y_mm, z_mm", key="data")
     return "data", columns
@@ -55,6 +55,12 @@ def asked(read: Callable[[Source], T], given: Source) -> T:
     try:
         return read(given)
     except InputError as error:
+        if isinstance(given, tuple) and "the first line holds numbers" in str(error):
+            message = (
+                "data: the columns have numbers in place of names; name them, as in "
+                'table.columns = ["q1_deg", "q2_deg", …, "x_mm", "y_mm", "z_mm"]'
+            )
+            raise InputError(message, key="data") from None
         if not isinstance(given, tuple) or "needs a unit" not in str(error):
             raise
         message = (
@@ -187,7 +193,7 @@ def warn(messages: Iterable[str], stacklevel: int) -> None:
         warnings.warn(message, FlexcalWarning, stacklevel=stacklevel + 1)
 
 
-def _columns(data: Any) -> Iterator[tuple[Any, Any]]:
+def _columns(data: Any, argument: str = "data") -> Iterator[tuple[Any, Any]]:
     if isinstance(data, Mapping):
         yield from data.items()
     elif isinstance(data, np.ndarray) and data.dtype.names is not None:
@@ -203,7 +209,10 @@ def _columns(data: Any) -> Iterator[tuple[Any, Any]]:
         yield from _columns(pyarrow.table(data))
     else:
         kind = type(data).__name__
-        raise TypeError(f"data: a path, a DataFrame or a dict of arrays is needed, not {kind}")
+        raise TypeError(
+            f"{argument}: a path, a DataFrame or a dict of arrays is needed, not {kind}; for arrays with a row for each pose "
+            'write {"q_deg": q, "xyz_mm": xyz}'
+        )
 
 
 def _refuse_twice(names: Sequence[str]) -> None:
@@ -223,6 +232,12 @@ def _split(name: str, values: Any, joints: Sequence[str]) -> Iterator[tuple[str,
     array = _plain(f"column {name}", values, "data")
     base, _, unit = name.partition("_")
     suffix = f"_{unit}" if unit else ""
+    most = {"xyz": 3, "q": len(joints), "approach": len(joints)}.get(base, 0)
+    rows, columns = array.shape
+    if rows <= most < columns:
+        wanted = "(rows, 3)" if base == "xyz" else "(rows, joints)"
+        message = f"column {name}: shape {array.shape}, and {wanted} is needed, with a row for each pose; transpose the array (.T)"
+        raise InputError(message, file="data", key=f"column {name}")
     if base == "xyz" and array.shape[1] == 3:
         parts = ["x", "y", "z"]
     elif base in ("q", "approach"):

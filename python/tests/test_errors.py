@@ -65,6 +65,9 @@ def changed(**columns: Any) -> pd.DataFrame:
         (FRAME.iloc[:0], 1, None, "no rows"),
         ({"q1_deg": [1.0, 2.0], "x_mm": [1.0]}, None, "column x_mm", "1 values for 2 rows"),
         ({"x_mm": np.zeros((2, 2))}, None, "column x_mm", "two dimensions"),
+        ({"q_deg": np.zeros((3, 60)), "x_mm": np.zeros(60)}, None, "column q_deg", "transpose the array"),
+        ({"xyz_mm": np.zeros((3, 60))}, None, "column xyz_mm", r"\(rows, 3\) is needed"),
+        (FRAME.set_axis(range(FRAME.shape[1]), axis=1), None, "data", "columns have numbers in place of names"),
         ({}, None, "data", "no columns"),
     ],
 )

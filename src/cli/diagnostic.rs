@@ -1,8 +1,9 @@
 //! Errors and warnings on the terminal; an error in the input with the line of the file.
 
 use std::error::Error;
+use std::fs;
 use std::io::{IsTerminal as _, Write as _};
-use std::path::PathBuf;
+use std::path::Path;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
@@ -24,24 +25,55 @@ pub fn print(error: &(dyn Error + 'static)) {
     let with_arguments =
         error.downcast_ref().and_then(by_arguments).or(mistake.and_then(with_argument));
     let message = with_arguments.unwrap_or_else(|| message_with_causes(error));
-    let message = match file_like_missing(error, mistake) {
-        Some(file) => format!("{message}; there is {}", file.display()),
+    let message = match missing_file(error, mistake).and_then(beside) {
+        Some(beside) => format!("{message}; {beside}"),
         None => message,
     };
     show(Level::ERROR, &message, mistake.map(|input| &*input.location));
 }
 
-/// Returns the path of a file with a name like that of the file that an error says is missing.
-fn file_like_missing(
-    error: &(dyn Error + 'static),
-    mistake: Option<&InputError>,
-) -> Option<PathBuf> {
+/// Returns the path that an error may say is missing.
+fn missing_file<'a>(
+    error: &'a (dyn Error + 'static),
+    mistake: Option<&'a InputError>,
+) -> Option<&'a Path> {
     let missing = match (mistake.map(|input| &*input.kind), error.downcast_ref()) {
         (Some(InputErrorKind::DataFileMissing { path }), _)
         | (_, Some(SavedEstimateError::NoSuchFile { file: path })) => path,
         _ => &mistake.filter(|input| input.location.line.is_none())?.location.file,
     };
-    file_like(missing)
+    Some(missing)
+}
+
+/// Describes what is found in place of a missing file: a link without its target, a file below
+/// folders that are separated by `\`, one whose name goes on behind a space, or one with a similar
+/// name. `None` if the file exists, or nothing is found.
+fn beside(missing: &Path) -> Option<String> {
+    if missing.exists() {
+        return None;
+    }
+    if let Some(link) = missing.ancestors().find(|path| path.is_symlink() && !path.exists()) {
+        let target = fs::read_link(link).ok()?;
+        return Some(format!(
+            "{} is a link to {}, which is not there",
+            link.display(),
+            target.display()
+        ));
+    }
+    let name = missing.to_str()?;
+    let with_slashes = name.replace('\\', "/");
+    if with_slashes != name && Path::new(&with_slashes).exists() {
+        return Some(format!("on this system write {with_slashes}"));
+    }
+    let folder = missing.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let entries = fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?.flatten();
+    let start = format!("{} ", missing.file_name()?.to_str()?);
+    let mut names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    if let Some(longer) = names.find(|name| name.starts_with(&start)) {
+        let path = missing.with_file_name(longer);
+        return Some(format!("a name with spaces needs quotes: there is \"{}\"", path.display()));
+    }
+    file_like(missing).map(|file| format!("there is {}", file.display()))
 }
 
 /// Returns the message of an error in the input with the argument that would avoid it; `None` if no

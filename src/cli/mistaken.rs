@@ -112,6 +112,11 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
         _ => None,
     };
     let first = words.get(1)?.to_str()?;
+    let is_value = |kind| matches!(kind, ErrorKind::InvalidValue | ErrorKind::ValueValidation);
+    if words.iter().any(|word| word.is_empty()) && is_value(error.kind()) {
+        let tip = "an argument is empty, as it is if a variable of the shell has no value";
+        return Some(tip.to_owned());
+    }
     match error.kind() {
         ErrorKind::InvalidSubcommand => {
             let path = Path::new(context(ContextKind::InvalidSubcommand)?);
@@ -154,7 +159,7 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
                 let other = || other_command(word, first, cli);
                 let table = || table_without_option(word, first);
                 let spaced = || unquoted(word, words);
-                let second = || second_problem(word, words);
+                let second = || two_estimates(word, words).or_else(|| second_problem(word, words));
                 let found = long_dash(word).or_else(|| negative_number(words));
                 let found = found.or_else(other).or_else(table).or_else(spaced).or_else(second);
                 found.filter(|_| is_unknown)
@@ -187,6 +192,18 @@ fn long_dash(word: &str) -> Option<String> {
     let option = format!("--{name}");
     (name.len() < word.len())
         .then(|| format!("{word:?} begins with a dash of typeset text: write {option}"))
+}
+
+/// Returns the tip for two estimates after `compare`; `None` for other arguments.
+fn two_estimates(word: &str, words: &[OsString]) -> Option<String> {
+    let first =
+        words.get(2).filter(|_| words.get(1).is_some_and(|command| command == "compare"))?;
+    let estimates = [Path::new(first), Path::new(word)];
+    let is_json = |path: &&Path| path.extension().is_some_and(|end| end == "json");
+    let [first, second] = estimates.map(shell_word);
+    estimates.iter().all(is_json).then(|| {
+        format!("compare-results compares two estimates: flexcal compare-results {first} {second}")
+    })
 }
 
 /// Returns the tip for a second problem; `None` if `word` is none, or if no problem precedes it.

@@ -221,7 +221,7 @@ impl Results {
             return why("names with .flexcal in front are for flexcal's own records");
         }
         if path.is_dir() {
-            return why("a folder of that name is in the way");
+            return why("a folder of that name is in the way; name a file in it, or another place");
         }
         match path.ancestors().skip(1).find(|above| above.symlink_metadata().is_ok()) {
             Some(above) if !above.is_dir() && !above.as_os_str().is_empty() => {

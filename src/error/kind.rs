@@ -70,8 +70,8 @@ pub enum InputErrorKind {
     MissingKey { write: String, near: Option<String> },
     #[error("a section is expected here; write {write}")]
     NotASection { write: String },
-    #[error("expected {expected}, found {found}")]
-    WrongType { expected: &'static str, found: &'static str },
+    #[error("expected {expected}, found {found}{remedy}")]
+    WrongType { expected: &'static str, found: &'static str, remedy: String },
     #[error("{noun} needs a unit; write {write}")]
     NeedsUnit { noun: &'static str, write: String },
     #[error("{noun} is not given in {suffix}; write {write}")]
@@ -248,13 +248,9 @@ pub enum InputErrorKind {
     // The following errors concern effects.
     #[error(
         "an effect is one key, as in `gear-ratio = {{ joint = 2 }}`; found {found}{}",
-        match (*found > 1, *are_effects) {
-            (true, true) => "; write each into an [[effect]] of its own",
-            (true, false) => ": a key of another section stands above the sections [[effect]]",
-            (false, _) => "",
-        }
+        with_remedy(remedy.as_deref())
     )]
-    NotOneEffect { found: usize, are_effects: bool },
+    NotOneEffect { found: usize, remedy: Option<String> },
     #[error("needs arguments; write {write}")]
     NeedsArguments { write: String },
     #[error("unknown effect{}; known: {}", suggestion(name, *known), known.join(", "))]

@@ -53,15 +53,33 @@ pub(super) fn suggestion<T: AsRef<str>>(word: &str, known: impl IntoIterator<Ite
 }
 
 /// Returns the suggestion for an unknown key: a unit if several known keys differ from it by their
-/// unit alone, otherwise a similar key.
+/// unit alone, otherwise a similar key, or those that a first word is missing to.
 pub(super) fn key_suggestion(key: &str, known: &[String]) -> String {
     let is_with_unit =
         |name: &&String| name.strip_prefix(key).is_some_and(|end| end.starts_with('_'));
     if known.iter().filter(is_with_unit).count() > 1 {
         return format!(" ({key} needs a unit)");
     }
-    suggestion(key, known)
+    if key.starts_with("EI_") && known.iter().any(|name| name == "EIy_N_m2") {
+        return " (did you mean EIy_N_m2 and EIz_N_m2, equal for a round tube?)".to_owned();
+    }
+    let near = suggestion(key, known);
+    if !near.is_empty() {
+        return near;
+    }
+    // A key without its first word, such as sigma_mm.
+    let is_longer = |name: &&String| {
+        let end = name.split_once('_').map_or("", |(_, end)| end);
+        let unit = end.strip_prefix(key).and_then(|end| end.strip_prefix('_'));
+        end == key || unit.is_some_and(|unit| !["m", "rad"].contains(&unit))
+    };
+    let longer: Vec<&str> = known.iter().filter(is_longer).map(String::as_str).collect();
+    let is_some = !longer.is_empty() && longer.len() <= MAX_LONGER_KEYS;
+    if is_some { format!(" (did you mean {}?)", longer.join(" or ")) } else { near }
 }
+
+/// Maximum number of longer keys that are suggested.
+const MAX_LONGER_KEYS: usize = 6;
 
 /// Characters of regular expressions, none of which is in a name of a parameter.
 const EXPRESSION_CHARACTERS: [char; 8] = ['{', '}', '|', '?', '(', ')', '^', '$'];
@@ -71,6 +89,9 @@ const EXPRESSION_CHARACTERS: [char; 8] = ['{', '}', '|', '?', '(', ')', '^', '$'
 pub(super) fn pattern_suggestion(pattern: &str, known: &[String]) -> String {
     if pattern.starts_with("joint[") || pattern.contains(EXPRESSION_CHARACTERS) {
         return " (only * stands for other text: write a rule for each joint)".to_owned();
+    }
+    if known.iter().any(|name| name.strip_prefix(pattern).is_some_and(|end| end.starts_with('.'))) {
+        return format!(" (did you mean \"{pattern}.*\"?)");
     }
     if let Some(joint) = pattern.strip_suffix(".stiffness")
         && known.iter().any(|name| *name == format!("{joint}.alpha"))

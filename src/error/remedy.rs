@@ -37,11 +37,6 @@ fn remedy(location: &Location, kind: &InputErrorKind) -> &'static str {
         InputErrorKind::WrongType { found: "a list", .. } if name.contains("_sigma") => {
             "; one σ holds for all axes, and a column sigma_mm states one for each row"
         }
-        InputErrorKind::WrongType { found: "text", .. }
-            if section == "effect" && name == "joint" =>
-        {
-            "; write the number of the joint, counted from 1"
-        }
         InputErrorKind::UnknownKey { key, known }
             if section == "effect"
                 && !location.key.as_deref().is_some_and(|path| path.contains("].law"))

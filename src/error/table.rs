@@ -145,6 +145,8 @@ pub enum TableErrorKind {
         }
     )]
     NotMeasured { is_result: bool },
+    #[error("the words are commanded and read; another table of joints is {write}")]
+    JointTable { write: String },
     #[error(
         "missing; add {write}, or, if another table holds the joints, write {JOINED} in [data]"
     )]
@@ -286,8 +288,33 @@ pub enum TableErrorKind {
     OpenQuote,
     #[error("the row is empty; delete it")]
     EmptyRow,
-    #[error("the cell is empty")]
+    #[error("the cell is empty; fill it in, or leave the row out")]
     EmptyCell,
+    #[error("the cell is empty; write {write}")]
+    EmptyWord { write: &'static str },
+    #[error(
+        "\"{value}\" is an error of a spreadsheet; correct its formula (or widen the column, if it \
+         shows ####), or leave the row out"
+    )]
+    SpreadsheetError { value: String },
+    #[error(
+        "\"{value}\" {what}; write {write}{}",
+        if *of_format { ", or change the number format of the column" } else { "" }
+    )]
+    OtherNotation { value: String, what: &'static str, write: String, of_format: bool },
+    #[error(
+        "none of the columns needed is here (the table has {}): is it another sheet or file? \
+         Needed are {needed}",
+        found.join(", ")
+    )]
+    NoneOfColumns { found: Vec<String>, needed: String },
+    #[error(
+        "the cells of this row are separated by {found:?}, those of the header by {header:?}; make \
+         them alike"
+    )]
+    SeparatedOtherwise { found: char, header: char },
+    #[error("\"{value}\" is {meant}")]
+    NumberAsTime { value: String, meant: String },
     #[error(
         "the cell is empty; if nothing was measured here, write missing = \"\" in [data.format], \
          and such rows are left out"

@@ -50,8 +50,14 @@ pub enum UrdfErrorKind {
     BadName,
     #[error("another {what} is called \"{name}\"")]
     Repeated { what: &'static str, name: String },
-    #[error("\"{text}\" is not {count} finite number{}", if *count == 1 { "" } else { "s" })]
+    #[error(
+        "\"{text}\" is not {count} finite number{}{}",
+        if *count == 1 { "" } else { "s" },
+        written_numbers(text, *count)
+    )]
     NotNumbers { text: String, count: usize },
+    #[error("the file ends within <{element}: it was cut off; get the whole file again")]
+    Truncated { element: String },
     #[error("a mass of {text} kg is negative")]
     NegativeMass { text: String },
     #[error("the axis has no direction")]
@@ -113,9 +119,13 @@ pub enum UrdfErrorKind {
     OtherRobot { link: String, problem: String, robot: String },
     #[error(
         "no joint moves between \"{base}\" and \"{tip}\"{}",
-        if base == tip { "; the file holds this link alone: take the URDF of the whole arm" } else { "" }
+        match (base == tip, ends.is_empty()) {
+            (true, true) => "; the file holds this link alone: take that of the arm".to_owned(),
+            (true, false) => format!("; name a link farther out as --tip: {}", ends.join(", ")),
+            (false, _) => String::new(),
+        }
     )]
-    NothingMoves { base: String, tip: String },
+    NothingMoves { base: String, tip: String, ends: Vec<String> },
     #[error("the chain has {found} joints; at most {most}")]
     TooManyJoints { found: usize, most: usize },
     #[error(
@@ -172,4 +182,21 @@ const MAX_LISTED_NAMES: usize = 30;
 fn listed(names: &[String]) -> String {
     let more = and_more(names.len().saturating_sub(MAX_LISTED_NAMES));
     names.iter().take(MAX_LISTED_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ") + &more
+}
+
+/// Returns the numbers of an attribute as a URDF has them, if only their separators, brackets or
+/// decimal commas differ; otherwise an empty text.
+fn written_numbers(text: &str, count: usize) -> String {
+    let plain = text.replace(['[', ']', '(', ')', '{', '}'], " ");
+    let numbers = |text: &str| {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let are_numbers = words.iter().all(|word| word.parse::<f64>().is_ok_and(f64::is_finite));
+        (words.len() == count && are_numbers).then(|| words.join(" "))
+    };
+    let spaced = numbers(&plain.replace([',', ';'], " "));
+    if let Some(numbers) = spaced {
+        return format!("; separate numbers by spaces alone: \"{numbers}\"");
+    }
+    let points = numbers(&plain.replace(',', "."));
+    points.map_or_else(String::new, |numbers| format!("; write decimal points: \"{numbers}\""))
 }

@@ -86,7 +86,10 @@ pub enum PriorError {
         file.display()
     )]
     Untrusted { file: PathBuf },
-    #[error("{}: all {rows} rows of the table were fitted there already, so nothing is new", file.display())]
+    #[error(
+        "{}: all {rows} rows to fit were fitted there already, so nothing is new; give new rows",
+        file.display()
+    )]
     NothingNew { file: PathBuf, rows: usize },
 }
 

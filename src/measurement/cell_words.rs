@@ -24,10 +24,61 @@ pub(super) fn has_thousands(word: &str) -> bool {
         && word.replace(',', "").parse::<f64>().is_ok()
 }
 
+/// Returns the number that a word holds with further signs, with what it is and whether the number
+/// format of a spreadsheet writes it so; `None` for other words.
+fn decorated(word: &str) -> Option<(String, &'static str, bool)> {
+    let of = |number: &str| {
+        let number = number.trim();
+        parsed(number).map(|_| number.to_owned())
+    };
+    let inner = word.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
+    if let Some(number) = inner.and_then(of).filter(|number| !number.starts_with('-')) {
+        return Some((format!("-{number}"), "is a negative number in parentheses", true));
+    }
+    if let Some(number) = word.strip_suffix(['-', '+']).and_then(of) {
+        let sign = if word.ends_with('-') { "-" } else { "" };
+        return Some((format!("{sign}{number}"), "has its sign behind it", true));
+    }
+    if let Some(number) = word.strip_prefix('\'').and_then(of) {
+        return Some((
+            number,
+            "begins with an apostrophe, by which a spreadsheet marks text",
+            false,
+        ));
+    }
+    if let Some((number, _)) = word.split_once(['±']) {
+        return of(number).map(|number| (number, "has an uncertainty", false));
+    }
+    let powers = ["*10^", "x10^", "×10^", "·10^", " E", " e"];
+    let with_e = powers.iter().find_map(|power| {
+        let (number, exponent) = word.split_once(power)?;
+        of(&format!("{}e{}", number.trim(), exponent.trim().trim_start_matches('+')))
+    });
+    with_e.map(|number| (number, "has its exponent in another notation", false))
+}
+
+/// Returns true for a word by which a spreadsheet marks an error, such as `#DIV/0!`, `#WERT!` or
+/// `Err:502`.
+pub(super) fn is_spreadsheet_error(word: &str) -> bool {
+    let code = word.strip_prefix("Err:").unwrap_or_default();
+    let is_code = !code.is_empty() && code.bytes().all(|byte| byte.is_ascii_digit());
+    let named = word.strip_prefix('#').unwrap_or_default();
+    is_code || named.starts_with(|c: char| c.is_alphabetic() || c == '#')
+}
+
+/// Returns true for the mark of a spreadsheet that a value is not available, in several languages.
+pub(super) fn is_not_available(word: &str) -> bool {
+    ["#N/A", "#NV", "#N/D", "#N/V"].contains(&word)
+}
+
 /// Returns the error of a number in a notation that is not read: thousands that are separated by
-/// spaces, the exponent of Fortran, or degrees with minutes and seconds. `None` for other words.
+/// spaces, the exponent of Fortran, degrees with minutes and seconds, or further signs. `None` for
+/// other words.
 pub(super) fn other_notation(word: &str) -> Option<TableErrorKind> {
     let value = shortened(word, 40);
+    if let Some((write, what, of_format)) = decorated(word) {
+        return Some(TableErrorKind::OtherNotation { value, what, write, of_format });
+    }
     let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     let unsigned = word.trim_start_matches(['-', '+']);
     if unsigned.is_empty() && word.len() == 1 {

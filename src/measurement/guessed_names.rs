@@ -64,6 +64,9 @@ impl Columns {
         (problem, numbering): (&Problem, &Numbering),
         (measured, unknown): (bool, &[&str]),
     ) -> Option<InputError> {
+        if let Some(error) = self.of_another_table(table, problem, (measured, unknown)) {
+            return Some(error);
+        }
         if problem.data.joints == JointSource::Read {
             return None;
         }
@@ -117,6 +120,41 @@ impl Columns {
         let kind = TableErrorKind::MissingColumns { missing, section, map };
         let location = Location { key: None, ..table.column("") };
         Some(location.error(kind))
+    }
+}
+
+impl Columns {
+    /// Returns the error of a table that has no column of joints or measurements, nor an `unknown`
+    /// one of numbers; `None` for other tables.
+    fn of_another_table(
+        &self,
+        table: &Table,
+        problem: &Problem,
+        (measured, unknown): (bool, &[&str]),
+    ) -> Option<InputError> {
+        let joints = 0..problem.joints.len();
+        let has_joint = joints
+            .into_iter()
+            .any(|index| self.has(Role::Joint(index)) || self.has(Role::Reading(index)));
+        let has_position = POSITION.into_iter().any(|role| self.has(role));
+        let is_unlike = |name: &&str| guess(name).is_none();
+        if has_joint
+            || has_position
+            || self.observes()
+            || unknown.len() < 2
+            || !unknown.iter().all(is_unlike)
+            || !self.of_numbers(unknown, table).is_empty()
+        {
+            return None;
+        }
+        let count = problem.joints.iter().filter(|joint| joint.takes_command()).count();
+        let joints =
+            if count > 1 { format!("q1_deg … q{count}_deg") } else { "q1_deg".to_owned() };
+        let measured =
+            if measured { " and what was measured, such as x_mm, y_mm, z_mm" } else { "" };
+        let found = unknown.iter().take(8).map(|name| crate::error::shortened(name, 40)).collect();
+        let kind = TableErrorKind::NoneOfColumns { found, needed: format!("{joints}{measured}") };
+        Some(Location { key: None, ..table.column("") }.error(kind))
     }
 }
 

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::join_key::is_time;
 use super::table::{Table, shortened};
-use super::time::{date_time, is_ambiguous};
+use super::time::{date_time, is_ambiguous, number_as_time};
 use crate::error::{InputError, TableErrorKind};
 use crate::problem::{ColumnSelector, Dialect};
 
@@ -110,7 +110,13 @@ impl Table {
     /// and time as seconds since 1970.
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
         let word = self.instant(place)?;
-        let not_a_time = || TableErrorKind::NotATime { value: shortened(&word) };
+        let not_a_time = || {
+            let value = shortened(&word);
+            match number_as_time(&word) {
+                Some(meant) => TableErrorKind::NumberAsTime { value, meant },
+                None => TableErrorKind::NotATime { value },
+            }
+        };
         match date_time(&word, self.date_order(place)) {
             Some(seconds) => Ok(seconds),
             None if word.is_empty() => self.number(place),

@@ -406,7 +406,14 @@ pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputErro
 /// Returns true if the current row's cell in the column with index `place` is the word
 /// `validation`, and false if it is `identification`; other words are errors.
 fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
-    match table.non_empty_text(place)? {
+    let word = table.non_empty_text(place).map_err(|error| match *error.kind {
+        InputErrorKind::Table(TableErrorKind::EmptyCell) => {
+            let write = "identification, or validation to hold the row out";
+            table.cell_error(place, TableErrorKind::EmptyWord { write })
+        }
+        _ => error,
+    })?;
+    match word {
         "validation" => Ok(true),
         "identification" => Ok(false),
         word => {

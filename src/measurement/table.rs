@@ -9,7 +9,9 @@ use csv::{ByteRecord, Reader, ReaderBuilder};
 use super::appended::Appended;
 use super::beginning::Beginning;
 use super::cell_style::CellStyle;
-use super::cell_words::{UNITS, has_thousands, is_spreadsheet_date, other_notation, unit_behind};
+use super::cell_words::{
+    UNITS, has_thousands, is_spreadsheet_date, is_spreadsheet_error, other_notation, unit_behind,
+};
 use super::cut_end::LastCells;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
 use super::headerless::is_row_of_numbers;
@@ -220,6 +222,8 @@ impl Table {
                 TableErrorKind::TrailingDelimiter { expected, found }
             } else if found < expected && self.is_line_of_words() {
                 TableErrorKind::TextLine { expected, found }
+            } else if let Some(other) = self.other_separator(expected) {
+                TableErrorKind::SeparatedOtherwise { found: other, header: self.style.delimiter }
             } else {
                 TableErrorKind::RowLength { expected, found }
             }));
@@ -382,6 +386,9 @@ impl Table {
             Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
             Err(_) if is_spreadsheet_date(word) => {
                 Err(self.cell_error(place, TableErrorKind::SpreadsheetDate { value: value() }))
+            }
+            Err(_) if is_spreadsheet_error(word) => {
+                Err(self.cell_error(place, TableErrorKind::SpreadsheetError { value: value() }))
             }
             Err(_) if word == self.name_of(place) => {
                 Err(self.error(TableErrorKind::HeaderRepeated))

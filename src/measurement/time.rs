@@ -145,6 +145,55 @@ fn hour_of_day(clock: &str) -> Option<(u32, &str, bool)> {
     Some((hour, rest, noon.is_some()))
 }
 
+/// Units of numbers that are times since 1970: noun, number of them in a second, and remedy.
+const EPOCH_UNITS: [(&str, f64, &str); 4] = [
+    ("seconds", 1.0, "call the column time_s"),
+    ("milliseconds", 1e3, "call the column time_ms"),
+    ("microseconds", 1e6, "divide them by 1000 and call the column time_ms"),
+    ("nanoseconds", 1e9, "divide them by 1e6 and call the column time_ms"),
+];
+
+/// Days from the zero of other programs to 1970-01-01, with their names: serial dates of
+/// spreadsheets, `datenum` of MATLAB, and modified Julian and Julian dates.
+const DAY_NUMBERS: [(&str, f64); 4] = [
+    ("a spreadsheet", 25_569.0),
+    ("MATLAB", 719_529.0),
+    ("the modified Julian calendar", 40_587.0),
+    ("the Julian calendar", 2_440_587.5),
+];
+
+/// End of the times that are taken for those of a measurement \[s since 1970\]: 2040-01-01.
+const LAST_DATE: f64 = 2_208_988_800.0;
+
+/// Describes a number in a column of times whose name states no unit, with its remedy; `None` for
+/// other texts.
+pub(super) fn number_as_time(text: &str) -> Option<String> {
+    let number: f64 = text.trim().replace(',', ".").parse().ok()?;
+    let is_date = |seconds: &f64| (FIRST_DATE..LAST_DATE).contains(seconds);
+    for (noun, count, remedy) in EPOCH_UNITS {
+        if is_date(&(number / count)) {
+            return Some(format!(
+                "a number of {noun} since 1970, {}; {remedy}",
+                shown(number / count)
+            ));
+        }
+    }
+    for (program, zero) in DAY_NUMBERS {
+        let seconds = (number - zero) * 86_400.0;
+        if is_date(&seconds) {
+            return Some(format!(
+                "a day number of {program}, {}; format the column as date and time, and export it \
+                 again",
+                shown(seconds.round())
+            ));
+        }
+    }
+    Some(
+        "a number without a unit; call the column time_s or time_ms, or write dates and times"
+            .to_owned(),
+    )
+}
+
 /// Smallest time that [`shown`] writes as a date \[s since 1970\]: 1990-01-01. Smaller numbers are
 /// seconds of a clock with another zero.
 pub(super) const FIRST_DATE: f64 = 631_152_000.0;

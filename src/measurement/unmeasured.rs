@@ -1,5 +1,6 @@
 //! Errors of rows that contain no measurement: summaries, titles of pages, and missing positions.
 
+use super::cell_words::is_not_available;
 use super::latin::parsed;
 use super::table::{Table, shortened};
 use crate::error::{InputError, InputErrorKind, TableErrorKind};
@@ -17,6 +18,16 @@ impl Table {
         let begins_with_word =
             cells().next().is_some_and(|cell| cell.starts_with(|c: char| c.is_alphabetic()));
         begins_with_word && filled().count() > 2 * numbers
+    }
+
+    /// Returns a separator, other than that of the header, with which the current row has as many
+    /// cells as the header.
+    pub(super) fn other_separator(&self, expected: usize) -> Option<char> {
+        let header = self.style.delimiter;
+        let cells = self.cells().iter().map(String::from_utf8_lossy).collect::<Vec<_>>();
+        let row = cells.join(&header.to_string());
+        let is_other = |other: &char| *other != header && row.split(*other).count() == expected;
+        [';', '\t', ',', '|'].into_iter().find(is_other).filter(|_| expected > 1)
     }
 
     /// Returns the error of an empty cell of the current row, or of the whole row if it is empty or
@@ -41,6 +52,11 @@ impl Table {
             InputErrorKind::Table(
                 TableErrorKind::EmptyCell | TableErrorKind::SummaryRow { .. },
             ) => self.cell_error(place, TableErrorKind::EmptyMeasurement),
+            InputErrorKind::Table(TableErrorKind::SpreadsheetError { value })
+                if is_not_available(&value) =>
+            {
+                self.cell_error(place, TableErrorKind::WordForMeasurement { value })
+            }
             InputErrorKind::Table(TableErrorKind::NotANumber { value })
                 if !value.contains(|c: char| c.is_ascii_digit()) =>
             {

@@ -121,6 +121,15 @@ fn read_joint(
     if placement.is_none() && form == DhForm::Modified {
         beta = section.number("beta", Unit::Angle)?.unwrap_or(0.0);
     }
+    let placed = ["xyz_m", "xyz_mm", "rpy_deg", "rpy_rad"];
+    if let Some(item) =
+        placed.iter().find_map(|key| section.peek(key)).filter(|_| kind != JointKind::Fixed)
+    {
+        let place = "xyz_m and rpy_deg place a joint with kind = \"fixed\": write such a joint \
+                     before this one, which takes alpha_deg, a_m, theta_deg and d_m, or let \
+                     flexcal init ARM.urdf convert a URDF";
+        return Err(item.error(InputErrorKind::MisplacedKey { place: place.to_owned() }));
+    }
     check_compatible_keys(&section, number, (follows, placement.is_some()))?;
     let limits = read_limits(&mut section, if follows { JointKind::Fixed } else { kind })?;
     let stiffness = read_stiffness(&mut section, "stiffness", Unit::TorsionalStiffness)?;

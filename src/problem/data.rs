@@ -10,7 +10,7 @@ use super::joint_log::{self, JointLog};
 use super::joint_source::JointSource;
 use super::path::without_detours;
 use super::section::Section;
-use crate::error::{InputError, InputErrorKind, Location};
+use crate::error::{InputError, InputErrorKind, Location, TableErrorKind};
 use crate::observation::{Needs, Observation, kinds};
 use crate::quantity::{Suffix, Unit};
 
@@ -178,6 +178,12 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         let (log, source) = joint_log::read(&item, folder)?;
         (joints, joint_log) = (source.unwrap_or_default(), Some(log));
         section.get("joints");
+    } else if let Some(item) = section.peek("joints").filter(|item| !is_word_of_joints(item)) {
+        let file = item.first_text().unwrap_or("joints.csv");
+        let write = format!(
+            "joints = {{ files = [\"{file}\"], by = \"name\" }}, by also \"order\" or \"time\""
+        );
+        return Err(item.error(TableErrorKind::JointTable { write }));
     } else if let Some(source) = section.word("joints", &JointSource::WORDS, &JointSource::EACH)? {
         joints = source;
     }
@@ -208,8 +214,14 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     })
 }
 
+/// Returns true unless the value of `joints` is a list, or the name of a file.
+fn is_word_of_joints(item: &Item<'_, '_>) -> bool {
+    item.text().map_or_else(|_| item.list("").is_err(), |word| !word.contains(['.', '/', '\\']))
+}
+
 /// Reads the entries `name = "meaning"`.
 fn read_covariates(section: &Section<'_, '_>) -> Result<Vec<DeclaredCovariate>, InputError> {
+    section.check_names()?;
     let entries = section.entries();
     if let Some((_, item)) = entries.first() {
         item.check_count("covariates", entries.len(), MAX_COVARIATES)?;

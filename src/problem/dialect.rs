@@ -146,6 +146,7 @@ pub(super) fn read(data: &mut Section<'_, '_>) -> Result<Dialect, InputError> {
 }
 
 fn read_columns(section: &Section<'_, '_>) -> Result<Vec<ColumnRule>, InputError> {
+    section.check_names()?;
     let entries = section.entries();
     if let Some((_, item)) = entries.first() {
         item.check_count("columns", entries.len(), MAX_MAPPED_COLUMNS)?;

@@ -153,12 +153,38 @@ fn only_entry<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, 'i
     match <[_; 1]>::try_from(section.entries()) {
         Ok([entry]) => Ok(entry),
         Err(entries) => {
-            let is_effect = |(key, _): &(&str, Item)| NAMES.contains(key);
-            let are_effects = entries.iter().all(is_effect);
-            let found = section.len();
-            Err(section.error(InputErrorKind::NotOneEffect { found, are_effects }))
+            let (found, remedy) = (section.len(), several_keys(&entries));
+            Err(section.error(InputErrorKind::NotOneEffect { found, remedy }))
         }
     }
+}
+
+/// Returns the remedy for an `[[effect]]` with several keys; `None` if it has none.
+fn several_keys(entries: &[(&str, Item)]) -> Option<String> {
+    let is_effect = |key: &str| key == LAW || NAMES.contains(&key);
+    let (first, _) = entries.first()?;
+    if entries.iter().all(|(key, _)| is_effect(key)) {
+        return Some("write each into an [[effect]] of its own".to_owned());
+    }
+    let named = entries.iter().find_map(|(key, item)| Some((*key, item.value.as_str()?)));
+    if let Some((key, name)) = named.filter(|(_, name)| is_effect(name)) {
+        let others = entries.iter().filter(|(other, _)| *other != key);
+        let arguments: Vec<String> = others.map(|(_, item)| item.written()).collect();
+        return Some(format!(
+            "the name of the effect is its key: write {name} = {{ {} }}",
+            arguments.join(", ")
+        ));
+    }
+    let other = entries.iter().map(|(key, _)| *key).find(|key| !is_effect(key));
+    let other = other.unwrap_or(first);
+    Some(if entries.iter().any(|(key, _)| is_effect(key)) {
+        format!(
+            "{other} is no effect: arguments of an effect stand within its braces, its prior in \
+             [parameters]"
+        )
+    } else {
+        "none of them is the name of an effect".to_owned()
+    })
 }
 
 /// Reads an effect of the catalogue, or a declared law.

@@ -102,16 +102,17 @@ impl<'a, 'i> Item<'a, 'i> {
     /// Returns the error that this value, a lower limit, is above the upper limit `upper`. The
     /// message quotes both entries.
     pub fn crossed_limits_error(&self, upper: &Self) -> InputError {
-        let written = |item: &Self| {
-            item.document
-                .text
-                .get(item.span.clone())
-                .unwrap_or_default()
-                .split_whitespace()
-                .collect::<Vec<_>>()
-                .join(" ")
-        };
-        self.error(InputErrorKind::LimitsCross { lower: written(self), upper: written(upper) })
+        self.error(InputErrorKind::LimitsCross { lower: self.written(), upper: upper.written() })
+    }
+
+    /// Returns the entry as it is written, on one line; that of a list or table without its value.
+    pub fn written(&self) -> String {
+        let text = self.document.text.get(self.span.clone()).unwrap_or_default();
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        match self.value {
+            DeValue::Array(_) | DeValue::Table(_) => format!("{words} = …"),
+            _ => words,
+        }
     }
 
     /// Returns the error for a value of the wrong type.
@@ -124,7 +125,8 @@ impl<'a, 'i> Item<'a, 'i> {
             DeValue::Array(_) => "a list",
             DeValue::Table(_) => "a table",
         };
-        self.error(InputErrorKind::WrongType { expected, found })
+        let remedy = self.type_remedy(expected);
+        self.error(InputErrorKind::WrongType { expected, found, remedy })
     }
 
     /// Returns true if the value is a table or a list that contains one.
@@ -237,6 +239,14 @@ impl<'a, 'i> Item<'a, 'i> {
     fn has_escape(&self) -> bool {
         let written = self.document.text.get(self.span.clone()).unwrap_or_default();
         ["\\t", "\\n", "\\r", "\\b", "\\f", "\\e"].iter().any(|escape| written.contains(escape))
+    }
+
+    /// Returns the text, or the first one of a list.
+    pub(super) fn first_text(&self) -> Option<&'a str> {
+        match self.value {
+            DeValue::Array(array) => array.iter().next()?.get_ref().as_str(),
+            value => value.as_str(),
+        }
     }
 
     /// Returns text, which may be empty.

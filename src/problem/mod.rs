@@ -38,6 +38,7 @@ mod standard;
 mod syntax;
 mod target;
 mod tree;
+mod wrong_type;
 
 use nalgebra::Vector3;
 

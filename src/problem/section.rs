@@ -234,7 +234,7 @@ impl<'a, 'i> Section<'a, 'i> {
     pub fn finish(&self) -> Result<(), InputError> {
         let unknown = self.entries().into_iter().find(|(key, _)| !self.was_read(key));
         match unknown {
-            Some((key, item)) => Err(item.error(match proper_place(key, &self.keys_read) {
+            Some((key, item)) => Err(item.error(match self.proper_place(key) {
                 Some(place) => InputErrorKind::MisplacedKey { place },
                 None => InputErrorKind::UnknownKey {
                     key: shortened(key, 80),
@@ -261,14 +261,20 @@ impl<'a, 'i> Item<'a, 'i> {
 }
 
 /// Sections with some of their keys that are often written in another section.
-const SECTION_KEYS: [(&str, &[&str]); 4] = [
+const SECTION_KEYS: [(&str, &[&str]); 5] = [
     ("", &["gravity_m_s2", "dh", "title"]),
     (
         "data",
         &[
             "files",
             "held_out",
+            "joints",
             "position_sigma_mm",
+            "position_sigma_m",
+            "point_sigma_mm",
+            "distance_sigma_mm",
+            "surface_sigma_mm",
+            "tilt_sigma_deg",
             "orientation_sigma_deg",
             "reference_temperature_C",
             "columns",
@@ -276,9 +282,50 @@ const SECTION_KEYS: [(&str, &[&str]); 4] = [
             "covariates",
         ],
     ),
-    ("tool", &["target_m", "target_mm", "payload_kg"]),
+    ("tool", &["target_m", "target_mm", "payload_kg", "payload_at", "payload_at_m"]),
+    ("statics", &["equilibrium"]),
     ("joint", &["alpha_deg", "a_m", "a_mm", "theta_deg", "d_m", "d_mm", "min_deg", "max_deg"]),
 ];
+
+/// Returns true if a key belongs to a section directly.
+pub(super) fn is_key_of(section: &str, key: &str) -> bool {
+    SECTION_KEYS.iter().any(|(name, keys)| *name == section && keys.contains(&key))
+}
+
+impl Section<'_, '_> {
+    /// Returns the place where an unknown key belongs; `None` if it is a key of no section, or is
+    /// similar to a key that is known at its place.
+    fn proper_place(&self, key: &str) -> Option<String> {
+        let place = proper_place(key, &self.keys_read)?;
+        Some(self.place_above(key).unwrap_or(place))
+    }
+
+    /// Returns the place of a key of the section that the header of this one ends, as the line
+    /// `[data.columns]` ends `[data]`; `None` for other keys, and for a table within braces.
+    fn place_above(&self, key: &str) -> Option<String> {
+        let names = self.path.split('.').map(|part| part.split('[').next().unwrap_or_default());
+        let names: Vec<&str> = names.collect();
+        let outer = names.first().filter(|outer| names.len() > 1 && is_key_of(outer, key))?;
+        let before = self.document.text.get(..self.span.start)?;
+        let is_header = before.rsplit('\n').next()?.trim_start().starts_with('[');
+        is_header.then(|| {
+            format!(
+                "{key} is a key of [{outer}], which the line [{}] ends; write it above that line",
+                names.join(".")
+            )
+        })
+    }
+
+    /// Checks that no key with another value than text belongs to the section above this one.
+    pub fn check_names(&self) -> Result<(), InputError> {
+        for (key, item) in self.entries() {
+            if let Some(place) = self.place_above(key).filter(|_| item.value.as_str().is_none()) {
+                return Err(item.error(InputErrorKind::MisplacedKey { place }));
+            }
+        }
+        Ok(())
+    }
+}
 
 /// Returns the place where an unknown key belongs; `None` if it is a key of no section, or is
 /// similar to a key that is `known` at its place.

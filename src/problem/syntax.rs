@@ -1,6 +1,7 @@
 //! Usual mistakes by which a text is not TOML.
 
 use super::item::Document;
+use super::wrong_type::number_and_unit;
 use crate::error::{InputErrorKind, JSON, TABLE, TOML, XML, text_format, typographic};
 
 /// Words that stand for true, false or nothing in other formats and languages.
@@ -34,8 +35,15 @@ impl Document {
         let line_after = after.lines().next().unwrap_or_default();
         let usual = usual_mistake(before_in_line, line_after, error.message());
         let single = single_brackets(previous_lines, before_in_line, line_after);
-        let single = single.filter(|_| error.message().contains("duplicate key"));
-        let (message, remedy) = single.or(usual).map_or_else(
+        let is_repeated = error.message().contains("duplicate key");
+        let single = single.filter(|_| is_repeated);
+        let first = (usual.is_none() && is_repeated).then(|| {
+            let line = line_of_key(previous_lines, &near_text);
+            let place =
+                line.map_or_else(String::new, |line| format!(", given already on line {line}"));
+            (format!("duplicate key{place}"), "delete one of the two")
+        });
+        let (message, remedy) = single.or(usual).or(first).map_or_else(
             || (error.message().to_owned(), None),
             |(what, remedy)| (what, Some(remedy)),
         );
@@ -94,6 +102,12 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
         )
     } else if OTHER_WORDS.contains(&word.to_lowercase().as_str()) {
         mistake("a word that TOML does not have", "write true or false, or text in quotes")
+    } else if has_unit(before, after) {
+        mistake(
+            "a unit behind a number",
+            "write the number alone; the end of the key states its unit, as in d_m = 0.36 or d_mm \
+             = 360",
+        )
     } else if is_expression {
         mistake(
             "a calculation",
@@ -120,6 +134,23 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
     } else {
         None
     }
+}
+
+/// Returns true if a number and its unit stand at the place between `before` and `after`.
+fn has_unit(before: &str, after: &str) -> bool {
+    let is_end = |c: char| ",=[]{}#".contains(c);
+    let start = before.rsplit(is_end).next().unwrap_or_default();
+    let end = after.split(is_end).next().unwrap_or_default();
+    number_and_unit(format!("{start}{end}").trim()).is_some()
+}
+
+/// Returns the number of the line above that gives the same key in the same section.
+fn line_of_key(previous_lines: &str, key: &str) -> Option<usize> {
+    let lines: Vec<&str> = previous_lines.lines().collect();
+    let is_header = |line: &&str| line.trim_start().starts_with('[');
+    let section = lines.iter().rposition(is_header).map_or(0, |place| place + 1);
+    let is_key = |line: &&str| line.split_once('=').is_some_and(|(first, _)| first.trim() == key);
+    Some(section + lines.get(section..)?.iter().position(is_key)? + 1)
 }
 
 /// Returns the mistake that the first element of a list has one bracket, where the list goes on in

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::Unit;
 
 /// Suffixes of units that are not read: quantity, and factor that converts to SI.
-const FOREIGN_UNITS: [(&str, Unit, f64); 31] = [
+const FOREIGN_UNITS: [(&str, Unit, f64); 34] = [
     ("um", Unit::Length, 1e-6),
     ("µm", Unit::Length, 1e-6),
     ("micron", Unit::Length, 1e-6),
@@ -36,6 +36,9 @@ const FOREIGN_UNITS: [(&str, Unit, f64); 31] = [
     ("min", Unit::Time, 60.0),
     ("h", Unit::Time, 3600.0),
     ("kN_m_per_rad", Unit::TorsionalStiffness, 1e3),
+    ("percent", Unit::Ratio, 1e-2),
+    ("pct", Unit::Ratio, 1e-2),
+    ("permille", Unit::Ratio, 1e-3),
     ("N_m_per_deg", Unit::TorsionalStiffness, 180.0 / PI),
 ];
 

@@ -5,7 +5,7 @@ use super::document::{
 };
 use super::errors::{
     DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM, both_parts, error_label, held_out_rows, rows_of,
-    test_rows_word, unpredicted, with_unit,
+    test_rows_word, unpredicted,
 };
 use super::found_effects::{UNCOMPARED, found_effects, found_heading, rounds, status_table};
 use super::identify::{
@@ -14,7 +14,7 @@ use super::identify::{
 };
 use super::noise::{expected_interval, format_chi2, influential_rows, reservations, residual_fact};
 use super::parameters::{against_priors, joint_names, parameters};
-use super::remainder::{PredictionAccuracy, why_no_bound};
+use super::remainder::{PredictionAccuracy, corrected_sentence, why_no_bound};
 use super::render::{Report, report, text};
 use super::residual_tests::{self, other_reduced_chi2};
 use super::unexplained::{structure_places, structure_sentences, to_declare};
@@ -139,25 +139,10 @@ fn head<'a>(
         Block::Text(verdict(result, closure.after.sigma_scale < 1.0, &reservations)),
     ];
     blocks.extend(
-        accuracy.and_then(|accuracy| corrected_sentence(closure, accuracy)).map(Block::Text),
+        accuracy.and_then(|accuracy| corrected_sentence(&closure.after, accuracy)).map(Block::Text),
     );
     blocks.extend(cautions_on_causes(problem, closure, result));
     blocks
-}
-
-/// States the held-out error with and without a remainder that is kept; `None` without one.
-fn corrected_sentence(closure: &ClosedLoop, accuracy: &PredictionAccuracy) -> Option<String> {
-    let (before, after) = (&closure.after.fitted.held_out, accuracy.corrected.as_ref()?);
-    let [with, without] = [after, before].map(|errors| with_unit(errors, errors.mean.norm));
-    Some(if after.mean.norm > before.mean.norm {
-        format!(
-            "A remainder is kept, but with it the mean held-out error rises from {without} to {with}."
-        )
-    } else {
-        format!(
-            "A remainder is kept: with it the mean held-out error is {with} instead of {without}."
-        )
-    })
 }
 
 /// Returns the cautions that concern the causes: missing declarations, influential rows, findings,
@@ -488,11 +473,9 @@ fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<Stri
             others.len()
         )),
     };
-    let differs = failed.first().and_then(|test| {
-        let shows_size = test.contains("χ²/ν");
-        other_reduced_chi2(&closure.residual_tests, &closure.after).filter(|_| shows_size)
-    });
-    let differs = differs.map_or_else(String::new, |sentence| format!(" {sentence}"));
+    let differs = other_reduced_chi2(&closure.residual_tests, &closure.after)
+        .filter(|_| !failed.is_empty())
+        .map_or_else(String::new, |sentence| format!(" {sentence}"));
     let parts: Vec<String> = structure.into_iter().chain(tests).collect();
     (!parts.is_empty() && (result.trusted || !closure.after.names_mistake())).then(|| {
         format!("What remains: {}.{differs} Details: -v or report.html.", parts.join("; "))

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::document::{Block, Column, Table, code};
+use super::errors::with_unit;
 use super::figures;
 use super::render::text_width;
 use crate::fit::{ErrorSummary, FindingCode, Identification};
@@ -75,6 +76,24 @@ fn held_out_gain(before: &ErrorSummary, after: Option<&ErrorSummary>) -> String 
         let _ = write!(words, "; the largest rises from {from} mm to {to} mm");
     }
     words
+}
+
+/// States the held-out error with and without a remainder that is kept; `None` without one.
+pub(super) fn corrected_sentence(
+    after: &Identification,
+    accuracy: &PredictionAccuracy,
+) -> Option<String> {
+    let (before, after) = (&after.fitted.held_out, accuracy.corrected.as_ref()?);
+    let [with, without] = [after, before].map(|errors| with_unit(errors, errors.mean.norm));
+    Some(if after.mean.norm > before.mean.norm {
+        format!(
+            "A remainder is kept, but with it the mean held-out error rises from {without} to {with}."
+        )
+    } else {
+        format!(
+            "A remainder is kept: with it the mean held-out error is {with} instead of {without}."
+        )
+    })
 }
 
 /// Returns the sentences on a remainder as a paragraph of a screen.

@@ -114,7 +114,8 @@ fn declaration<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, '
         (Some(single), 0) => Ok(single),
         (last, others) => {
             let found = others + usize::from(last.is_some());
-            Err(section.error(InputErrorKind::NotOneEffect { found, are_effects: true }))
+            let remedy = (found > 1).then(|| "write each into an [[effect]] of its own".to_owned());
+            Err(section.error(InputErrorKind::NotOneEffect { found, remedy }))
         }
     }
 }

@@ -155,8 +155,11 @@ impl<'a> Chain<'a> {
         let mut chain = Self { robot, base, tip, joints, stages, end, other_leaves, camera: None };
         chain.compute_stages()?;
         if chain.stages.is_empty() {
+            let is_inner = |link: usize| robot.joints.iter().any(|joint| joint.parent == link);
+            let ends = (0..robot.links.len()).filter(|&link| link != tip && !is_inner(link));
+            let ends = ends.map(name).collect();
             let (base, tip) = (name(base), name(tip));
-            return Err(robot.error(UrdfErrorKind::NothingMoves { base, tip }));
+            return Err(robot.error(UrdfErrorKind::NothingMoves { base, tip, ends }));
         }
         Ok(chain)
     }

@@ -11,6 +11,9 @@ const MAX_SHOWN: usize = 60;
 /// Returns the error of an element that is not closed before the closing tag of another one.
 /// `error` is that of the parser; `None` if it has another cause.
 pub(super) fn not_closed(source: &Document, error: &Error) -> Option<InputError> {
+    if matches!(error, Error::UnexpectedEndOfStream | Error::UnclosedRootNode) {
+        return truncated(source);
+    }
     let Error::UnexpectedCloseTag(name, before, position) = error else { return None };
     let line = position.row as usize;
     let starts = source.text.split_inclusive('\n').scan(0, |start, line| {
@@ -32,6 +35,20 @@ pub(super) fn not_closed(source: &Document, error: &Error) -> Option<InputError>
         line,
     };
     (closes && tag.starts_with(name.as_str())).then(|| source.locate(start..start + 1).error(kind))
+}
+
+/// Returns the error of a file that ends within an element, at the beginning of the innermost one.
+fn truncated(source: &Document) -> Option<InputError> {
+    let text: &str = &source.text;
+    let open = open_tags(text);
+    let last = text.rfind('<')?;
+    let rest = text.get(last + 1..)?;
+    // A tag that is cut off itself has no end.
+    let is_cut = !rest.starts_with(['/', '!', '?']) && tag_end(rest).is_none();
+    let (start, tag) = if is_cut { (last, rest.trim_end()) } else { *open.last()? };
+    let end = if is_cut { "" } else { ">" };
+    let element = shortened(tag.lines().next().unwrap_or_default(), MAX_SHOWN) + end;
+    Some(source.locate(start..start + 1).error(UrdfErrorKind::Truncated { element }))
 }
 
 /// Returns the tags that are open at the end of a text, outermost first: the byte index of each

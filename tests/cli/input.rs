@@ -261,9 +261,23 @@ fn wrong_arguments_end_with_status_two_and_help_with_zero() {
             "identify . rows.csv",
             "tip: tables of measurements follow --data, as in flexcal identify PROBLEM --data rows.csv",
         ),
+        (
+            "compare a/estimate.json b/estimate.json",
+            "flexcal compare-results a/estimate.json b/estimate.json",
+        ),
+        ("identify .\\problem.toml", "on this system write ./problem.toml"),
         ("calibrate .", "tip: flexcal identify may be meant"),
     ] {
         assert_contains(&folder.flexcal(arguments).code(2).stderr, &[words]);
+    }
+    folder.write("my data.csv", "");
+    let spaced = folder.flexcal("check . --data my").code(2);
+    assert_contains(&spaced.stderr, &["quotes: there is \"my data.csv\""]);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("gone.csv", folder.path("latest.csv")).unwrap();
+        let linked = folder.flexcal("identify . --data latest.csv").code(2);
+        assert_contains(&linked.stderr, &["latest.csv is a link to gone.csv, which is not there"]);
     }
     let commas = Folder::with_lunar_sampler().flexcal("identify . --data=a.csv,b.csv").code(2);
     assert_contains(&commas.stderr, &["spaces separate files, as in --data a.csv b.csv"]);

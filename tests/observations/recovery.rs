@@ -235,3 +235,26 @@ fn a_held_plane_that_lies_elsewhere_is_named() {
     let is_named = |text: &String| text.contains("surface[table].d is held at 205 mm and fits as");
     assert!(held.as_ref().is_some_and(is_named), "{:?}", found.findings);
 }
+
+#[test]
+fn a_fixture_that_lies_far_from_its_prior_is_named() {
+    let anchor = "name = \"A\"\n";
+    for (at, is_far) in [("[1.4, 0.5, 1.2]", true), ("[1.501, 0.5, 1.2]", false)] {
+        let around = AROUND.replace(anchor, &format!("{anchor}at_m = {at}\n"));
+        let problem = problem(&format!("\"anchor[A].*\" = {{ sigma_mm = 2 }}\n{around}"));
+        let (arm, _) = true_arm(&problem, 5);
+        let table = Bench::new(arm, 11).table(&["position", "distance"], 120);
+        let found =
+            identify(&problem, &read_dataset(&problem, &table), &Options::default()).unwrap();
+        let beyond = found.finding(flexcal::fit::FindingCode::BeyondPrior);
+        assert_eq!(
+            (beyond.is_some(), found.is_trusted()),
+            (is_far, !is_far),
+            "{:?}",
+            found.findings
+        );
+        let Some(text) = beyond.map(ToString::to_string) else { continue };
+        assert!(text.contains("anchor[A].x deviates from nominal by"), "{text}");
+        assert!(text.contains("correct it in [[anchor]] \"A\": at_m = [1.5"), "{text}");
+    }
+}

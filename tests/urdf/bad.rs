@@ -31,7 +31,12 @@ fn mistakes_are_named_with_their_place() {
         (
             "cut",
             "<robot name=\"r\">\n<link name=\"a\">".to_owned(),
-            "not valid XML: the root node was opened but never closed",
+            ":2: the file ends within <link name=\"a\">: it was cut off; get the whole file again",
+        ),
+        (
+            "cut tag",
+            "<robot>\n<joint name=\"ro".to_owned(),
+            ":2: the file ends within <joint name=\"ro: it was",
         ),
         (
             "not closed",
@@ -73,6 +78,16 @@ fn mistakes_are_named_with_their_place() {
         ("no type", chain("", ""), "<joint> has no attribute type"),
         ("axis", revolute("<axis xyz=\"0 0 0\"/>"), ":5: the axis has no direction"),
         ("axis word", revolute("<axis xyz=\"z\"/>"), ":5: \"z\" is not 3 finite numbers"),
+        (
+            "commas",
+            revolute("<origin xyz=\"0,0,0.22\"/>"),
+            "is not 3 finite numbers; separate numbers by spaces alone: \"0 0 0.22\"",
+        ),
+        (
+            "decimal commas",
+            revolute("<origin xyz=\"0 0 0,22\"/>"),
+            "write decimal points: \"0 0 0.22\"",
+        ),
         ("nan", revolute("<origin xyz=\"0 nan 0\"/>"), ":5: \"0 nan 0\" is not 3 finite numbers"),
         ("huge", revolute("<origin rpy=\"1e300 0 0\"/>"), ":5: \"1e300 0 0\" is not 3 finite"),
         (

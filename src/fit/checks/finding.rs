@@ -158,7 +158,8 @@ finding_codes! {
          too: its probability is above 0.1 %.",
         "measure poses in which the two differ, or give priors that decide between them";
     BeyondPrior: Error "beyond-prior" ["parameter", "sigmas"]
-        "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",
+        "A parameter of the arm, or a number of a point, anchor, surface, camera or marker, \
+         deviates from nominal by more than 5 times the σ of its prior.",
         "check axes of the measuring frame, signs of joints, units, and the prior";
     ScaleContradicted: Error "scale-contradicted" ["error", "sigmas", "lengths"]
         "All fitted lengths of the arm together deviate from nominal by one factor, more than \

@@ -133,6 +133,10 @@ const OF_STRATEGY: [FindingCode; 6] = [
 const FAR_OFF: [FindingCode; 2] =
     [FindingCode::MissesMeasurements, FindingCode::NoBetterThanNominal];
 
+/// Remedy of findings that follow from a parameter far beyond its prior.
+const BEYOND_PRIOR_FIRST: &str =
+    "follow first the warning on the parameter that is far beyond its prior";
+
 /// Codes of findings that the residual of the fitted rows is beyond the declared σ.
 const BEYOND_NOISE: [FindingCode; 2] =
     [FindingCode::NoiseBeyondDeclared, FindingCode::ResidualBeyondDeclared];
@@ -279,6 +283,11 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
         found.code == FindingCode::HeldOutMissed && found.remedy != found.code.entry().remedy
     };
     let are_held_out_wrong = findings.iter().any(names_mistake);
+    // Names of fixtures stand in brackets.
+    let is_of_fixture = findings.iter().any(|found| {
+        found.code == FindingCode::BeyondPrior
+            && found.word("parameter").is_some_and(|name| name.contains('['))
+    });
     for finding in findings {
         // Remedies that name a cause stay.
         if finding.remedy != finding.code.entry().remedy {
@@ -288,9 +297,8 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             FindingCode::HeldOutBeyondPrediction if are_held_out_wrong => {
                 "correct first the held-out rows that another warning names"
             }
-            FindingCode::HeldOutBeyondPrediction if is_beyond_prior => {
-                "follow first the warning on the parameter that is far beyond its prior"
-            }
+            FindingCode::NominalFarOff if is_of_fixture => BEYOND_PRIOR_FIRST,
+            FindingCode::HeldOutBeyondPrediction if is_beyond_prior => BEYOND_PRIOR_FIRST,
             FindingCode::HeldOutWorse
             | FindingCode::HeldOutNotBetter
             | FindingCode::HeldOutOutliers

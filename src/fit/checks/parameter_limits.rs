@@ -10,8 +10,8 @@ use super::nominal_error::is_nominal_far_off;
 use crate::fit::stages::parameter_size::largest_deviation;
 use crate::fit::uncertainty::prior_sizes::PriorSize;
 use crate::model::parameter::{JointField, Parameter, ParameterSite};
-use crate::problem::Observation;
 use crate::problem::pattern::matches;
+use crate::problem::{FixtureKind, Observation};
 use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number, two_digits};
 use crate::spatial::{Frame, rotation_between};
@@ -48,11 +48,17 @@ pub(super) fn prior_sigmas(parameter: &Parameter, x: f64) -> Option<f64> {
     Some(x.abs() / parameter.sigma.filter(|_| is_of_arm(parameter))?)
 }
 
-/// Checks that no parameter of the arm deviates by more than [`MAX_PRIOR_SIGMAS`] σ of its prior.
+/// Checks that no parameter of the arm or of its fixtures deviates by more than
+/// [`MAX_PRIOR_SIGMAS`] σ of its prior.
 pub(super) struct WithinPriors;
 
 impl Check for WithinPriors {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let of_fixture = |parameter: &Parameter, x: f64| {
+            let is_fixture = matches!(parameter.site, ParameterSite::Fixture { .. });
+            let is_declared = is_fixture && parameter.regressor.is_constant();
+            Some(x.abs() / parameter.sigma.filter(|_| is_declared)?)
+        };
         let is_far = |parameter: &Parameter, x: f64| {
             prior_sigmas(parameter, x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
         };
@@ -62,6 +68,11 @@ impl Check for WithinPriors {
             let text =
                 format!("{name} deviates from nominal by {sigmas:.0} times the σ of its prior");
             let numbers = [name.as_str().into(), sigmas.into()];
+            if let (ParameterSite::Fixture { fixture, kind, axis }, Some(x)) = (parameter.site, x) {
+                let text = format!("{text}{}", values_in_words(parameter, x));
+                return Finding::new(FindingCode::BeyondPrior, numbers, text)
+                    .with_remedy(fixture_remedy(fit, fixture, (kind, axis)));
+            }
             let entry = x.and_then(|x| contradicted_entry(fit, (parameter, x), is_far));
             if let Some(entry) = entry {
                 let text = format!("{text}: {}", entry.words);
@@ -93,10 +104,54 @@ impl Check for WithinPriors {
                 None => finding,
             }
         };
-        let largest =
-            largest_ratio(fit, prior_sigmas).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
+        let ratio = |parameter: &Parameter, x| {
+            prior_sigmas(parameter, x).or_else(|| of_fixture(parameter, x))
+        };
+        let largest = largest_ratio(fit, ratio).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
         largest.map(finding).into_iter().collect()
     }
+}
+
+/// Returns the remedy for number `axis` of a fixture that deviates far from its declared value; it
+/// states the fitted numbers of the key that declares it.
+fn fixture_remedy(fit: &CheckedFit, fixture: usize, (kind, axis): (FixtureKind, usize)) -> String {
+    let (key, axes, factor, digits) = match axis {
+        6.. if kind.has_pose() => match axis {
+            6..8 => ("focal_px", 6..8, 1.0, 1),
+            8..10 => ("centre_px", 8..10, 1.0, 1),
+            _ => ("distortion", 10..kind.fields().len(), 1.0, 4),
+        },
+        3.. if kind.has_pose() => ("rotation_deg", 3..6, 1f64.to_degrees(), 2),
+        3 => ("radius_m", 3..4, 1.0, 4),
+        _ => ("at_m", 0..3, 1.0, 4),
+    };
+    let Some(declared) = fit.problem.fixtures.get(fixture) else { return String::new() };
+    let mut numbers: Vec<f64> =
+        declared.known.iter().map(|number| number.unwrap_or_default()).collect();
+    for (parameter, x) in fit.fitting.model.parameters.iter().zip(&fit.end.x) {
+        if let ParameterSite::Fixture { fixture: of, axis, .. } = parameter.site
+            && of == fixture
+            && parameter.regressor.is_constant()
+            && let Some(number) = numbers.get_mut(axis)
+        {
+            *number = parameter.value(*x);
+        }
+    }
+    let word = kind.word();
+    let shown = numbers.get(axes).filter(|_| kind != FixtureKind::Plane).map(|numbers| {
+        let numbers: Vec<String> =
+            numbers.iter().map(|value| number(value * factor, digits)).collect();
+        match numbers.as_slice() {
+            [radius] => format!(": {key} = {radius} as fitted"),
+            numbers => format!(": {key} = [{}] as fitted", numbers.join(", ")),
+        }
+    });
+    format!(
+        "if it is mistyped, a guess or in another unit, correct it in [[{word}]] \"{}\"{}; \
+         otherwise check axes, signs of joints, names in the column {word}, and the σ",
+        declared.name,
+        shown.unwrap_or_default()
+    )
 }
 
 /// Returns the rules of `[parameters]` with the prior widths that the data indicate, if that of

@@ -351,7 +351,14 @@ impl<'a> Parser<'a> {
             .chain(moments)
             .chain(quantities)
             .chain(functions);
-        Mistake::UnknownWord { word: word.to_owned(), near: nearest(word, candidates) }
+        // A controller calls its joints A1, J1 or axis1.
+        let number = word.trim_start_matches(|c: char| c.is_ascii_alphabetic() || c == '_');
+        let joint = number.parse().ok().filter(|joint| (1..=slides.len()).contains(joint));
+        let command = || joint.map(|joint| format!("q{joint}, the command of joint {joint}"));
+        Mistake::UnknownWord {
+            word: word.to_owned(),
+            near: nearest(word, candidates).or_else(command),
+        }
     }
 
     /// Returns the unit of the command of a joint, counted from 0.

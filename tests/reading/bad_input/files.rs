@@ -22,7 +22,10 @@ fn whole_problems() {
         ("name = 'arm'", &["joint: ", "at least one joint"]),
         ("name = 'arm'\njoint = []", &["joint: ", "at least one joint"]),
         ("name = 'arm'\n[joint]\na_m = 1", &[":2: joint: ", "double brackets"]),
-        ("name = 'arm'\nname = 'leg'", &[":2: not valid TOML: duplicate key, near `name`"]),
+        (
+            "name = 'arm'\nname = 'leg'",
+            &[":2: not valid TOML: duplicate key, given already on line 1, near `name`"],
+        ),
         ("name = 'arm'\n\n[[joint]", &[":3: not valid TOML"]),
         ("name = 'arm", &[":1: not valid TOML"]),
         ("name = 'arm'\n[[joint]]\nd_m = 0,1273\n", &["write numbers with a decimal point"]),

@@ -1,6 +1,7 @@
 //! Input errors: each message names file, line and key; `tests/fuzz` has random mutations.
 
 mod files;
+mod meant;
 mod reading;
 mod sections;
 mod tables;

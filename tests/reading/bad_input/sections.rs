@@ -11,7 +11,7 @@ fn joints_and_beams() {
         ("EA_N = 0", &[":6: joint[1].beam.EA_N: 0 is not above zero"]),
         (
             "EI_N_m2 = 1e4",
-            &[":6: joint[1].beam.EI_N_m2: unknown key (did you mean EIy_N_m2?); known here: "],
+            &[":6: joint[1].beam.EI_N_m2: unknown key (did you mean EIy_N_m2 and EIz_N_m2, equal "],
         ),
         ("EA = 1", &[":6: joint[1].beam.EA: ", "EA_N"]),
         ("mass = 1", &[":6: joint[1].beam.mass: a mass needs a unit; write mass_kg"]),

@@ -1,0 +1,151 @@
+//! Remedies for values of another type than their key takes.
+
+use toml::de::DeValue;
+
+use super::item::Item;
+use crate::error::shortened;
+use crate::quantity::Unit;
+
+/// Signs of units with the endings of keys that state them.
+const UNIT_SIGNS: [(&str, &str); 5] =
+    [("°", "deg"), ("degrees", "deg"), ("degree", "deg"), ("°C", "C"), ("pixels", "px")];
+
+impl Item<'_, '_> {
+    /// Returns `; ` and the remedy for a value that is not what is `expected`; an empty text if the
+    /// value shows none.
+    pub(super) fn type_remedy(&self, expected: &str) -> String {
+        self.meant(expected).map_or_else(String::new, |remedy| format!("; {remedy}"))
+    }
+
+    /// Returns the remedy for a value whose meaning is clear though its type is wrong.
+    fn meant(&self, expected: &str) -> Option<String> {
+        let key = self.key.rsplit('.').next().unwrap_or_default();
+        // Elements of lists have a number and no key.
+        let write = |value: &str| match key.split_once('[') {
+            None => format!("write {key} = {value}"),
+            Some(_) => format!("write {value}"),
+        };
+        let name = key.split('[').next().unwrap_or_default();
+        let is_number = matches!(self.value, DeValue::Integer(_) | DeValue::Float(_));
+        match (expected, self.value) {
+            ("a whole number", DeValue::String(text))
+                if ["joint", "joints", "from", "parent"].contains(&name) =>
+            {
+                let names = self.names_of("joint", &["name"]);
+                let place = names.iter().position(|name| *name == text.trim());
+                Some(match place {
+                    Some(place) => {
+                        format!("{}, the number of this joint", write(&(place + 1).to_string()))
+                    }
+                    None => "write the number of the joint, counted from 1".to_owned(),
+                })
+            }
+            ("a number" | "a whole number", DeValue::String(text)) => {
+                let text = text.trim();
+                let decimal = text.replace(',', ".");
+                if decimal.parse::<f64>().is_ok() {
+                    return Some(format!("a number stands without quotes: {}", write(&decimal)));
+                }
+                let (number, unit) = number_and_unit(text)?;
+                Some(format!(
+                    "the end of the key states the unit, and the value is the number alone: {}",
+                    with_unit(name, number, unit)
+                ))
+            }
+            ("true or false", DeValue::String(text)) => {
+                let word = text.trim().to_lowercase();
+                let value = match word.as_str() {
+                    "true" | "yes" | "on" => "true",
+                    "false" | "no" | "off" => "false",
+                    _ => return None,
+                };
+                Some(format!("without quotes: {}", write(value)))
+            }
+            ("text in quotes", _) if name == "link" => {
+                let names = self.names_of("joint", &["beam", "name"]);
+                let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+                Some(match names.first() {
+                    Some(first) => format!(
+                        "write the name of a beam, {}: {}",
+                        names.join(" or "),
+                        write(first)
+                    ),
+                    None => "write the name of a beam; this arm has none".to_owned(),
+                })
+            }
+            ("text in quotes", DeValue::Integer(number)) if ["on", "at"].contains(&name) => {
+                Some(write(&format!("\"joint{}\"", number.as_str())))
+            }
+            ("text in quotes", DeValue::Integer(_) | DeValue::Float(_)) => {
+                Some(write(&format!("\"{}\"", self.written_number()?)))
+            }
+            (list, DeValue::String(text)) if list.starts_with("a list") => {
+                let text = text.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']);
+                let words: Vec<&str> =
+                    text.split([',', ' ', ';']).filter(|word| !word.is_empty()).collect();
+                let are_numbers = words.iter().all(|word| word.parse::<f64>().is_ok());
+                if list.contains("numbers") {
+                    return are_numbers.then(|| write(&format!("[{}]", words.join(", "))));
+                }
+                list.contains("file names")
+                    .then(|| write(&format!("[\"{}\"]", shortened(text, 60))))
+            }
+            ("a list of 2 numbers", _) if is_number => {
+                let number = self.written_number()?;
+                Some(format!("if both are alike, {}", write(&format!("[{number}, {number}]"))))
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the texts at `path` in the tables `[[list]]` of the file that holds this value, in
+    /// the order of the file.
+    fn names_of(&self, list: &str, path: &[&str]) -> Vec<String> {
+        let Ok(root) = self.document.table() else { return Vec::new() };
+        let tables = root.get_ref().get(list).and_then(|list| list.get_ref().as_array());
+        let name = |table: &toml::Spanned<DeValue<'_>>| {
+            let mut value = table.get_ref();
+            for key in path {
+                value = value.as_table()?.get(*key)?.get_ref();
+            }
+            value.as_str().map(str::to_owned)
+        };
+        // A joint without a name keeps its place.
+        let names = tables.into_iter().flat_map(|tables| tables.iter());
+        if path.len() > 1 {
+            return names.filter_map(name).collect();
+        }
+        names.map(|table| name(table).unwrap_or_default()).collect()
+    }
+}
+
+/// Splits a text into a number and the unit behind it; `None` for other texts.
+pub(super) fn number_and_unit(text: &str) -> Option<(&str, &str)> {
+    let ends = |(place, c): (usize, char)| {
+        let is_exponent = matches!(c, 'e' | 'E')
+            && text
+                .get(place + 1..)?
+                .starts_with(|next: char| next.is_ascii_digit() || next == '-');
+        (!(c.is_ascii_digit() || "+-._".contains(c) || is_exponent)).then_some(place)
+    };
+    let end = text.char_indices().find_map(ends)?;
+    let (number, unit) = text.split_at(end);
+    let unit = unit.trim();
+    let is_unit = (1..=12).contains(&unit.len())
+        && unit.chars().all(|c| c.is_alphabetic() || "°%/*·²³\"'′″".contains(c));
+    (is_unit && number.parse::<f64>().is_ok()).then_some((number, unit))
+}
+
+/// Writes a number with its unit in the ending of the key, as in `d_mm = 360` for `360 mm` under
+/// `d_m`.
+fn with_unit(key: &str, number: &str, unit: &str) -> String {
+    let sign = UNIT_SIGNS.iter().find(|(sign, _)| *sign == unit);
+    let unit = sign.map_or(unit, |(_, suffix)| suffix);
+    let is_suffix = |unit: &str| Unit::all_suffixes().any(|suffix| suffix == unit);
+    match key.rsplit_once('_') {
+        Some((base, suffix)) if is_suffix(suffix) && is_suffix(unit) => {
+            format!("{base}_{unit} = {number}")
+        }
+        _ => format!("{key} = {number}"),
+    }
+}
