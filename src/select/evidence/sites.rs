@@ -3,7 +3,7 @@
 use super::hypothesis::Site;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
-use crate::problem::Problem;
+use crate::problem::{FIRST_COEFFICIENT, FOCAL_X, Problem};
 
 /// Returns the parameter sites of hypotheses without a law, for which derivatives are needed in
 /// addition to those of the effects.
@@ -13,6 +13,7 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
         (0..3).flat_map(|axis| [ParameterSite::Shift { axis }, ParameterSite::Turn { axis }]),
     );
     sites.extend((0..3).map(|axis| tool_site(problem, axis)));
+    sites.extend(camera_sites(problem));
     for joint in 0..problem.joints.len() {
         sites.extend(
             [JointField::Compliance, JointField::LateralX]
@@ -30,6 +31,15 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
 pub(super) fn tool_site(problem: &Problem, axis: usize) -> ParameterSite {
     let joint = problem.tool.joint.min(problem.joints.len().saturating_sub(1));
     ParameterSite::Joint { joint, field: JointField::After(axis) }
+}
+
+/// Returns the sites of changes of the focal lengths and centres of all cameras.
+pub(super) fn camera_sites(problem: &Problem) -> impl Iterator<Item = ParameterSite> + '_ {
+    let cameras = problem.fixtures.iter().enumerate();
+    cameras.filter(|(_, of)| of.kind.word() == "camera").flat_map(|(fixture, of)| {
+        let number = move |axis| ParameterSite::FixtureShift { fixture, kind: of.kind, axis };
+        (FOCAL_X..FIRST_COEFFICIENT).map(number)
+    })
 }
 
 /// Returns the sites of the geometric parameters of every joint.
