@@ -9,7 +9,7 @@
 
 use super::argument::{Argument, ArgumentKind, Field, FreeLength, Mount};
 use super::family::{At, Chance, Family, Need, Only, Prior, Search, TermEntry};
-use super::law::{LAW, Law};
+use super::law::{FOCAL, LAW, Law};
 use super::site::{ArmField, BeamField, JointField};
 use super::sizes::{
     DRIFT_SIGMA, EXPOSURE_DELAY_SIGMA, FLEXIBILITY_SIGMA, LENS_DRIFT_SIGMA, LENS_SAG_SIGMA,
@@ -451,15 +451,12 @@ catalogue! {
         needs: &[Need::Velocities],
         ..Family::PLAIN
     };
-    /// Drift of a lens with temperature: focal lengths and centre change by k (T − T₀).
+    /// Drift of a lens with temperature: both focal lengths change by k (T − T₀).
     LensThermalDrift "lens-thermal-drift" { camera: String = Camera } => Family {
         terms: &[
-            TermEntry::driven(At::Camera("fx"), "fx", "T", LENS_DRIFT_SIGMA),
-            TermEntry::driven(At::Camera("fy"), "fy", "T", LENS_DRIFT_SIGMA),
-            TermEntry::driven(At::Camera("cx"), "cx", "T", LENS_DRIFT_SIGMA),
-            TermEntry::driven(At::Camera("cy"), "cy", "T", LENS_DRIFT_SIGMA),
+            TermEntry::driven(At::Camera(FOCAL), "rate", "T", LENS_DRIFT_SIGMA),
         ],
-        says: "focal length and centre of camera {camera} move with temperature",
+        says: "the focal length of camera {camera} moves with temperature",
         needs: &[Need::Temperature],
         ..Family::PLAIN
     };

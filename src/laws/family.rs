@@ -143,7 +143,7 @@ pub enum At {
     Scale,
     /// Entry of the strain of the measuring frame, by its index: xx, yy, zz, xy, xz, yz.
     Strain(usize),
-    /// Number of the camera, by its name in parameters, such as `fx`.
+    /// Number of the camera, by its name in parameters, such as `fx`; `f` for both focal lengths alike.
     Camera(&'static str),
     /// Time between the reading of the joints and the exposure of a pixel, constant or per row of
     /// the image.

@@ -8,6 +8,8 @@ use super::term::{EffectTerm, LawParameter};
 
 /// Name of declared laws in files.
 pub(crate) const LAW: &str = "law";
+/// Name of the site at which both focal lengths of a camera change alike.
+pub(crate) const FOCAL: &str = "f";
 
 /// Law that the user declares or that a search composes: Δ = Σ cₖ fₖ at one site.
 ///
@@ -108,12 +110,12 @@ impl LawSite {
                 });
             };
             let is_field = |of: &&&str| field.strip_prefix('.') == Some(**of);
-            return match fields.iter().find(is_field) {
+            return match fields.iter().chain([&FOCAL]).find(is_field) {
                 Some(&field) => {
                     Ok(Self { place: LawPlace::Camera(name.clone()), at: At::Camera(field) })
                 }
                 None => Err(format!(
-                    "{text} is no site; write camera[{name}]. and one of {}",
+                    "{text} is no site; write camera[{name}]. and one of {}, {FOCAL}",
                     fields.join(", ")
                 )),
             };

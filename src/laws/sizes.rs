@@ -20,7 +20,7 @@ pub(super) const EXPOSURE_DELAY_SIGMA: f64 = 0.02;
 /// Prior σ of the time between the exposures of successive rows of an image \[s\]; sensors read a
 /// row in 5 to 60 µs.
 pub(super) const ROW_TIME_SIGMA: f64 = 3e-5;
-/// Prior σ of the change of focal lengths and centre of a lens with temperature [px/K].
+/// Prior σ of the change of a focal length with temperature [px/K].
 pub(super) const LENS_DRIFT_SIGMA: f64 = 0.3;
 /// Prior σ of the sine and cosine with which an image centre follows a joint \[px\].
 pub(super) const LENS_SAG_SIGMA: f64 = 1.0;

@@ -45,9 +45,11 @@ impl Instrument {
                 ParameterSite::Shift { axis } => {
                     instrument.shifts.extend(regressor().map(|value_of| (axis, value_of, value)));
                 }
-                ParameterSite::FixtureShift { fixture, axis, .. } => {
-                    let of_number = |value_of| (fixture, axis, value_of, value);
-                    instrument.fixtures.extend(regressor().map(of_number));
+                ParameterSite::FixtureShift { fixture, axis, count, .. } => {
+                    for axis in axis..axis + count {
+                        let of_number = |value_of| (fixture, axis, value_of, value);
+                        instrument.fixtures.extend(regressor().map(of_number));
+                    }
                 }
                 ParameterSite::Turn { axis } => {
                     instrument

@@ -70,9 +70,12 @@ impl<'m> JacobianWriter<'m> {
                 ParameterSite::Target { target, axis } => {
                     targets[target].columns[axis] = Some(column);
                 }
-                ParameterSite::Fixture { fixture, axis, .. }
-                | ParameterSite::FixtureShift { fixture, axis, .. } => {
+                ParameterSite::Fixture { fixture, axis, .. } => {
                     fixture_columns[fixture].push((axis, regressor(), column));
+                }
+                ParameterSite::FixtureShift { fixture, axis, count, .. } => {
+                    let of_number = |axis| (axis, regressor(), column);
+                    fixture_columns[fixture].extend((axis..axis + count).map(of_number));
                 }
                 ParameterSite::Turn { axis } => base_rotations.push((axis, regressor(), column)),
                 ParameterSite::Scale

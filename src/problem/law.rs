@@ -5,7 +5,7 @@ use super::section::Section;
 use super::{Data, Fixture, FixtureKind, Joint, JointKind, beam_names, named_cameras};
 use crate::error::{InputError, InputErrorKind};
 use crate::laws::expression::{FormulaError, Vocabulary};
-use crate::laws::{At, BeamField, Effect, Law, LawParameter, LawPrior, LawSite};
+use crate::laws::{At, BeamField, Effect, FOCAL, Law, LawParameter, LawPrior, LawSite};
 use crate::quantity::Unit;
 
 /// Maximum number of terms of one law.
@@ -91,6 +91,7 @@ pub(crate) fn law_unit(at: At, joint: Option<usize>, joints: &[Joint]) -> Unit {
         }
         At::Beam(BeamField::Stretch) => Unit::Ratio,
         At::Beam(_) => Unit::PerLength,
+        At::Camera(FOCAL) => Unit::Pixel,
         At::Camera(field) => [FixtureKind::Camera, FixtureKind::Fisheye]
             .iter()
             .find_map(|kind| Some(kind.unit(kind.fields().iter().position(|name| *name == field)?)))

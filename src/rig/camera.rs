@@ -8,7 +8,7 @@ use super::draw::{Row, between, rounded_command};
 use super::equilibrium::Equilibrium;
 use super::truth::Truth;
 use super::{NoEquilibrium, Rig};
-use crate::laws::{At, Law};
+use crate::laws::{At, FOCAL, Law};
 use crate::problem::{
     CENTRE_X, Effect, FOCAL_X, Fixture, FixtureKind, JointKind, Observation, PoseConditions,
 };
@@ -130,16 +130,17 @@ impl Rig {
             }
         };
         let is_of = |camera: &String| *camera == declared.name;
-        for (axis, field) in declared.kind.fields().iter().enumerate() {
+        let fields = declared.kind.fields().iter().copied().enumerate();
+        for (axis, field) in fields.chain([(FOCAL_X, FOCAL), (FOCAL_X + 1, FOCAL)]) {
             let is_there =
                 |law: &Law| law.at() == At::Camera(field) && law.camera() == Some(&declared.name);
             add(axis, self.added_by_laws(conditions, is_there));
         }
         for effect in self.effect_values() {
             match effect {
-                (Effect::LensThermalDrift { camera }, rates) if is_of(camera) => {
-                    let changes = rates.iter().map(|rate| rate * self.warming(conditions));
-                    (FOCAL_X..).zip(changes).for_each(|(axis, by)| add(axis, by));
+                (Effect::LensThermalDrift { camera }, [rate]) if is_of(camera) => {
+                    let change = rate * self.warming(conditions);
+                    (FOCAL_X..CENTRE_X).for_each(|axis| add(axis, change));
                 }
                 (Effect::LensSag { camera, joint }, [x_sin, x_cos, y_sin, y_cos])
                     if is_of(camera) =>

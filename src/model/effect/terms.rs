@@ -3,10 +3,10 @@
 use super::coverage::Columns;
 use crate::laws::expression::Vocabulary;
 use crate::laws::{
-    At, Effect, EffectTerm, JointField, LAW, LawParameter, NamedCamera, Need, Quantity,
+    At, Effect, EffectTerm, FOCAL, JointField, LAW, LawParameter, NamedCamera, Need, Quantity,
 };
 use crate::model::parameter::{EffectParameter, ParameterSite, Regressor};
-use crate::problem::{JointKind, Problem, named_cameras};
+use crate::problem::{FOCAL_X, JointKind, Problem, named_cameras};
 
 /// Parameter of an effect on an arm, with the site where it enters the model.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,8 +113,13 @@ impl Effect {
             At::Camera(field) => {
                 let fixture = problem.camera(&self.camera()?)?;
                 let kind = problem.fixtures.get(fixture)?.kind;
-                let axis = kind.fields().iter().position(|name| *name == field)?;
-                ParameterSite::FixtureShift { fixture, kind, axis }
+                let axis = kind.fields().iter().position(|name| *name == field);
+                match axis {
+                    None if field == FOCAL => {
+                        ParameterSite::FixtureShift { fixture, kind, axis: FOCAL_X, count: 2 }
+                    }
+                    axis => ParameterSite::FixtureShift { fixture, kind, axis: axis?, count: 1 },
+                }
             }
         })
     }

@@ -59,6 +59,8 @@ pub enum ParameterSite {
         kind: FixtureKind,
         /// Index of the number among the fixture's numbers.
         axis: usize,
+        /// How many numbers from that one on change alike.
+        count: usize,
     },
     /// Displacement of every measured position, measuring frame.
     Shift {

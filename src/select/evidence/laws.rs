@@ -277,10 +277,8 @@ fn elsewhere(
         add(format!("measurement.{letter}"), ParameterSite::Shift { axis });
         add(format!("base.r{letter}"), ParameterSite::Turn { axis });
     }
-    for lever in camera_sites(problem) {
-        let ParameterSite::FixtureShift { fixture, kind, axis } = lever else { continue };
-        let field = kind.fields().get(axis).copied().unwrap_or_default();
-        add(format!("camera[{}].{field}", problem.fixtures[fixture].name), lever);
+    for (name, lever) in camera_sites(problem) {
+        add(name, lever);
     }
     for coordinate in members.iter().filter_map(|&member| of(member).coordinate) {
         let ParameterSite::Joint { joint, field } = coordinate else { continue };
