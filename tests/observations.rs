@@ -17,6 +17,8 @@ mod camera_plans;
 mod cameras;
 #[path = "observations/derivatives.rs"]
 mod derivatives;
+#[path = "observations/lens_laws.rs"]
+mod lens_laws;
 #[path = "observations/moved.rs"]
 mod moved;
 #[path = "observations/named.rs"]

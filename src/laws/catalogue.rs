@@ -9,8 +9,13 @@
 
 use super::argument::{Argument, ArgumentKind, Field, FreeLength, Mount};
 use super::family::{At, Chance, Family, Need, Only, Prior, Search, TermEntry};
-use super::law::{LAW, Law};
+use super::law::{FOCAL, LAW, Law};
 use super::site::{ArmField, BeamField, JointField};
+use super::sizes::{
+    DRIFT_SIGMA, EXPOSURE_DELAY_SIGMA, FLEXIBILITY_SIGMA, LENS_DRIFT_SIGMA, LENS_SAG_SIGMA,
+    MAX_TURN, PAYLOAD_SHIFT_SIGMA, READING_SHIFT_SIGMA, RELATIVE_SIGMA, ROW_TIME_SIGMA,
+    SETUP_SHIFT_SIGMA,
+};
 
 /// Returns the key of an argument: the name of its field, or the text after `as`.
 macro_rules! key {
@@ -91,30 +96,6 @@ macro_rules! catalogue {
         }
     };
 }
-
-/// Prior σ of a coefficient that adds to a joint's coordinate \[rad\] or \[m\], or to a beam's
-/// strain or curvature [1/m], per unit of the formula that it multiplies.
-const DRIFT_SIGMA: f64 = 1e-3;
-/// Prior σ of a relative error, such as that of a transmission ratio or of a scale.
-const RELATIVE_SIGMA: f64 = 0.01;
-/// Prior σ of a displacement of the instrument's readings \[m\].
-const READING_SHIFT_SIGMA: f64 = 5e-3;
-/// Prior σ of the displacement \[m\] and of the rotation \[rad\] of an instrument that was knocked
-/// or set up again.
-const SETUP_SHIFT_SIGMA: f64 = 1e-2;
-/// Prior σ of a bending flexibility 1/EI [1/(N·m²)].
-const FLEXIBILITY_SIGMA: f64 = 1e-2;
-/// Prior σ of a displacement of the payload's centre of mass \[m\].
-const PAYLOAD_SHIFT_SIGMA: f64 = 0.1;
-/// Prior σ of the time between the reading of the joints and the exposure of an image's first row
-/// \[s\].
-const EXPOSURE_DELAY_SIGMA: f64 = 0.02;
-/// Prior σ of the time between the exposures of successive rows of an image \[s\]; sensors read a
-/// row in 5 to 60 µs.
-const ROW_TIME_SIGMA: f64 = 3e-5;
-/// Largest plausible rotation of a joint by the cubic term of its torsion, under the largest
-/// plausible moment \[rad\].
-const MAX_TURN: f64 = 0.1;
 
 catalogue! {
     /// Compliance of a joint that is declared rigid: Δθ = c `M_z`.
@@ -466,8 +447,31 @@ catalogue! {
             TermEntry::at(At::Exposure { by_row: false }, "delay", EXPOSURE_DELAY_SIGMA),
             TermEntry::at(At::Exposure { by_row: true }, "row", ROW_TIME_SIGMA),
         ],
-        says: "images of camera {camera} are exposed later than the joints are read, row after row",
+        says: "images of camera {camera} are exposed at another time than the joints are read (a delay, and a time per row)",
         needs: &[Need::Velocities],
+        ..Family::PLAIN
+    };
+    /// Drift of a lens with temperature: both focal lengths change by k (T − T₀).
+    LensThermalDrift "lens-thermal-drift" { camera: String = Camera } => Family {
+        terms: &[
+            TermEntry::driven(At::Camera(FOCAL), "rate", "T", LENS_DRIFT_SIGMA),
+        ],
+        says: "the focal length of camera {camera} moves with temperature",
+        needs: &[Need::Temperature],
+        ..Family::PLAIN
+    };
+    /// Sag of a lens or sensor under its weight: the centre moves with the attitude of the camera,
+    /// and so with a joint between it and the base.
+    LensSag "lens-sag" { camera: String = Camera, joint: usize = TurningJoint } => Family {
+        terms: &[
+            TermEntry::driven(At::Camera("cx"), "cx_sin", "sin(q{joint})", LENS_SAG_SIGMA),
+            TermEntry::driven(At::Camera("cx"), "cx_cos", "cos(q{joint})", LENS_SAG_SIGMA),
+            TermEntry::driven(At::Camera("cy"), "cy_sin", "sin(q{joint})", LENS_SAG_SIGMA),
+            TermEntry::driven(At::Camera("cy"), "cy_cos", "cos(q{joint})", LENS_SAG_SIGMA),
+        ],
+        says: "the image centre of camera {camera} moves with the angle of joint {joint}",
+        only: &[Only::CarriesCamera],
+        needs: &[Need::Moves("joint"), Need::Loads],
         ..Family::PLAIN
     };
     /// Displacement of a joint's coordinate, or small motion of the base, proportional to a

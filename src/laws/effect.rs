@@ -88,6 +88,9 @@ impl Effect {
 
     /// Returns the name of the camera on whose images the effect acts; `None` if there is none.
     pub(crate) fn camera(&self) -> Option<String> {
+        if let Self::Law(law) = self {
+            return law.camera().map(str::to_owned);
+        }
         let (key, _) = self.key_of(|kind| kind == ArgumentKind::Camera)?;
         match self.argument(key)? {
             Argument::Name(name) => Some(name),

@@ -143,6 +143,8 @@ pub enum At {
     Scale,
     /// Entry of the strain of the measuring frame, by its index: xx, yy, zz, xy, xz, yz.
     Strain(usize),
+    /// Number of the camera, by its name in parameters, such as `fx`; `f` for both focal lengths alike.
+    Camera(&'static str),
     /// Time between the reading of the joints and the exposure of a pixel, constant or per row of
     /// the image.
     Exposure {
@@ -195,6 +197,8 @@ pub enum Only {
     Undeflected,
     /// Requires a beam with a hoist; otherwise the effect is refused.
     Hoisted,
+    /// Requires that the joint moves the camera; otherwise the effect is no candidate.
+    CarriesCamera,
     /// Requires a joint that carries bodies with mass; otherwise the effect is refused.
     Bodies,
 }

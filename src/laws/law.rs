@@ -8,6 +8,8 @@ use super::term::{EffectTerm, LawParameter};
 
 /// Name of declared laws in files.
 pub(crate) const LAW: &str = "law";
+/// Name of the site at which both focal lengths of a camera change alike.
+pub(crate) const FOCAL: &str = "f";
 
 /// Law that the user declares or that a search composes: Δ = Σ cₖ fₖ at one site.
 ///
@@ -44,6 +46,8 @@ pub enum LawPlace {
     Joint(usize),
     /// Link, by the name of its beam.
     Link(String),
+    /// Camera, by its name.
+    Camera(String),
     /// Base or measurement as a whole.
     Whole,
 }
@@ -58,6 +62,9 @@ pub struct LawPrior {
     /// Standard deviation (1 σ) in the unit of that key.
     pub written: f64,
 }
+
+/// Name of a camera, and the names of its numbers.
+pub(crate) type NamedCamera = (String, &'static [&'static str]);
 
 /// Site of a law: a place, and the quantity there to which the law adds.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -80,8 +87,9 @@ impl LawSite {
         Self { place: LawPlace::Joint(number), at: At::Coordinate }
     }
 
-    /// Parses a site as in files: `joint3`, `A.curvature_y`, `base.rx`, `measurement.x`. Names of
-    /// joints are also accepted.
+    /// Parses a site as in files: `joint3`, `A.curvature_y`, `base.rx`, `measurement.x`,
+    /// `camera[hand].fx`. Names of joints are also accepted. `cameras` are the names of the cameras,
+    /// each with the names of its numbers.
     ///
     /// # Errors
     /// Returns the reason, as a sentence, why the text is no site of this arm.
@@ -90,7 +98,28 @@ impl LawSite {
         joints: usize,
         names: &[(String, usize)],
         links: &[String],
+        cameras: &[NamedCamera],
     ) -> Result<Self, String> {
+        let of_camera = text.strip_prefix("camera[").and_then(|text| text.split_once(']'));
+        if let Some((camera, field)) = of_camera {
+            let Some((name, fields)) = cameras.iter().find(|(name, _)| name == camera) else {
+                let known: Vec<&str> = cameras.iter().map(|(name, _)| name.as_str()).collect();
+                return Err(match known.join(", ") {
+                    none if none.is_empty() => format!("{text} is no site: there is no [[camera]]"),
+                    known => format!("no camera is called \"{camera}\"; there are {known}"),
+                });
+            };
+            let is_field = |of: &&&str| field.strip_prefix('.') == Some(**of);
+            return match fields.iter().chain([&FOCAL]).find(is_field) {
+                Some(&field) => {
+                    Ok(Self { place: LawPlace::Camera(name.clone()), at: At::Camera(field) })
+                }
+                None => Err(format!(
+                    "{text} is no site; write camera[{name}]. and one of {}, {FOCAL}",
+                    fields.join(", ")
+                )),
+            };
+        }
         let [x, y, z, turns @ ..] = MOTION_NAMES;
         let axes = [x, y, z];
         let motion = |field: &str| MOTION_NAMES.iter().position(|name| *name == field);
@@ -258,6 +287,11 @@ impl Law {
         if let LawPlace::Link(link) = &self.place { Some(link) } else { None }
     }
 
+    /// Returns the name of the camera on whose images the law acts; `None` if there is none.
+    pub fn camera(&self) -> Option<&str> {
+        if let LawPlace::Camera(camera) = &self.place { Some(camera) } else { None }
+    }
+
     /// Returns the named parameters inside the formulas.
     pub fn parameters(&self) -> &[LawParameter] {
         &self.parameters
@@ -309,11 +343,13 @@ impl Law {
             At::Beam(BeamField::BowY) => ".curvature_y",
             At::Beam(BeamField::BowZ) => ".curvature_z",
             At::Beam(_) => ".strain",
+            At::Camera(field) => field,
             _ => "",
         };
         match &self.place {
             LawPlace::Joint(joint) => format!("joint{joint}{field}"),
             LawPlace::Link(link) => format!("{link}{field}"),
+            LawPlace::Camera(camera) => format!("camera[{camera}].{field}"),
             LawPlace::Whole => String::new(),
         }
     }
@@ -342,6 +378,7 @@ impl Law {
                 format!("the frame behind joint {joint} {}", motion(axis))
             }
             (LawPlace::Joint(joint), _) => format!("joint {joint}"),
+            (LawPlace::Camera(camera), At::Camera(field)) => format!("{field} of camera {camera}"),
             (_, At::Tool(axis)) => format!("the tool {}", motion(axis)),
             (_, At::Shift(RANGE_AXIS)) => "the measured range".to_owned(),
             (_, At::Shift(axis)) => format!("the measured position {}", motion(axis)),

@@ -14,6 +14,7 @@ mod family;
 mod law;
 mod quantity;
 mod site;
+mod sizes;
 mod term;
 mod text;
 
@@ -24,8 +25,8 @@ pub(crate) use catalogue::NAMES;
 pub use catalogue::{Effect, FAMILIES};
 pub(crate) use effect::{declaration, to_three_digits};
 pub(crate) use family::{At, Chance, Family, Need, Only, Prior, RANGE_AXIS, Search};
-pub(crate) use law::LAW;
-pub(crate) use law::{Law, LawPrior, LawSite};
+pub(crate) use law::{FOCAL, LAW};
+pub(crate) use law::{Law, LawPrior, LawSite, NamedCamera};
 pub use quantity::Quantity;
 pub(crate) use site::ArmField;
 pub use site::{BeamField, JointField};

@@ -2,15 +2,18 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::pose::Pose;
 use crate::laws::RANGE_AXIS;
 use crate::model::parameter::{Parameter, ParameterSite, Regressor, value_regressor};
+use crate::observation::FixtureValues;
 use crate::problem::PoseView;
 use crate::spatial::Frame;
 
 /// Error model of the measuring instrument.
 ///
 /// A position p reads as p (1 + s) + E p + Σ dᵢ·regressorᵢ with displacements dᵢ. All bases rotate
-/// about the measuring frame's origin by the rotation vector Σ ωᵢ·regressorᵢ.
+/// about the measuring frame's origin by the rotation vector Σ ωᵢ·regressorᵢ. Numbers of cameras
+/// change in the same way.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Instrument {
     /// Relative scale error s of the instrument: measured lengths are 1 + s times the true ones.
@@ -22,6 +25,8 @@ pub(super) struct Instrument {
     shifts: Vec<(usize, Regressor, f64)>,
     /// Axis, regressor and size [rad per unit of the regressor] of each rotation ω.
     rotations: Vec<(usize, Regressor, f64)>,
+    /// Fixture, index of its number, regressor and size of each change of a number of a fixture.
+    fixtures: Vec<(usize, usize, Regressor, f64)>,
 }
 
 impl Instrument {
@@ -39,6 +44,12 @@ impl Instrument {
                 }
                 ParameterSite::Shift { axis } => {
                     instrument.shifts.extend(regressor().map(|value_of| (axis, value_of, value)));
+                }
+                ParameterSite::FixtureShift { fixture, axis, count, .. } => {
+                    for axis in axis..axis + count {
+                        let of_number = |value_of| (fixture, axis, value_of, value);
+                        instrument.fixtures.extend(regressor().map(of_number));
+                    }
                 }
                 ParameterSite::Turn { axis } => {
                     instrument
@@ -73,7 +84,24 @@ impl Instrument {
             strain: None,
             shifts: of_bases(&self.shifts),
             rotations: of_bases(&self.rotations),
+            fixtures: Vec::new(),
         }
+    }
+
+    /// Returns the (at most two) fixtures that a row refers to, with the changes of their numbers in
+    /// the row; the others are default. `values` are those without changes.
+    #[inline]
+    pub fn fixtures(&self, pose: &Pose, values: &[FixtureValues<f64>]) -> [FixtureValues<f64>; 2] {
+        pose.observation.fixtures().map(|fixture| {
+            let Some(fixture) = fixture else { return FixtureValues::default() };
+            let mut found = values[fixture];
+            for (of, axis, regressor, size) in &self.fixtures {
+                if *of == fixture {
+                    found.numbers[*axis] += size * regressor.value(&pose.setup);
+                }
+            }
+            found
+        })
     }
 
     /// Returns the reading of a position, measuring frame \[m\].

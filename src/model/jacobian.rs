@@ -12,13 +12,12 @@ use super::elastic::ElasticDerivatives;
 use super::instrument::Instrument;
 use super::load_moments::JacobianColumn;
 use super::pose::{MeasuredOrientation, Pose};
-use super::predictor::fixtures_of;
 use super::rigid::RigidDerivatives;
 use super::rows::{Rows, clear_block, inputs};
 use super::tilt::TiltDerivatives;
 use crate::least_squares::Block;
 use crate::model::parameter::{ParameterSite, Regressor};
-use crate::observation::{FixtureValues, MAX_FIXTURE_NUMBERS, Needs, Scene, Slopes};
+use crate::observation::{FixtureValues, Needs, Scene, Slopes};
 use crate::problem::PoseView;
 use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
 
@@ -34,8 +33,9 @@ pub(super) struct JacobianWriter<'m> {
     bases: Vec<BaseDerivatives>,
     targets: Vec<TargetDerivatives>,
     fixtures: Vec<FixtureValues<f64>>,
-    /// Jacobian columns of the numbers of each fixture; `None` for fixed numbers.
-    fixture_columns: Vec<[Option<usize>; MAX_FIXTURE_NUMBERS]>,
+    /// Index of the number, regressor and Jacobian column of each unknown that acts on a number of
+    /// a fixture, for each fixture.
+    fixture_columns: Vec<Vec<(usize, Regressor, usize)>>,
     /// Derivatives of tilts; `None` if the rows measure no tilt.
     tilts: Option<TiltDerivatives>,
     arm: ArmDerivatives,
@@ -61,7 +61,7 @@ impl<'m> JacobianWriter<'m> {
         };
         let mut targets: Vec<TargetDerivatives> = placements.enumerate().map(target).collect();
         let fixtures = model.fixtures(x);
-        let mut fixture_columns = vec![[None; MAX_FIXTURE_NUMBERS]; fixtures.len()];
+        let mut fixture_columns = vec![Vec::new(); fixtures.len()];
         let (mut instrument_columns, mut base_rotations) = (Vec::new(), Vec::new());
         for (column, of_column) in columns.iter().enumerate() {
             let (site, regressor) = (of_column.site, || of_column.regressor.clone());
@@ -71,7 +71,11 @@ impl<'m> JacobianWriter<'m> {
                     targets[target].columns[axis] = Some(column);
                 }
                 ParameterSite::Fixture { fixture, axis, .. } => {
-                    fixture_columns[fixture][axis] = Some(column);
+                    fixture_columns[fixture].push((axis, regressor(), column));
+                }
+                ParameterSite::FixtureShift { fixture, axis, count, .. } => {
+                    let of_number = |axis| (axis, regressor(), column);
+                    fixture_columns[fixture].extend((axis..axis + count).map(of_number));
                 }
                 ParameterSite::Turn { axis } => base_rotations.push((axis, regressor(), column)),
                 ParameterSite::Scale
@@ -130,7 +134,7 @@ impl<'m> JacobianWriter<'m> {
         let (observation, last_column) = (pose.observation, block.parameters());
         let mut rows = Rows { block, row, scale: -1.0 / pose.sigma };
         let no_equilibrium = Vector3::from_element(f64::NAN);
-        let fixtures = fixtures_of(observation, |fixture| self.fixtures[fixture]);
+        let fixtures = self.instrument.fixtures(pose, &self.fixtures);
         let mut scene = Scene { fixtures, ..Scene::default() };
         let mut slopes = None;
         match observation.description().needs {
@@ -177,8 +181,8 @@ impl<'m> JacobianWriter<'m> {
         }
         let slopes = slopes.unwrap_or_else(|| observation.slopes(&scene));
         for (fixture, by) in observation.fixtures().into_iter().flatten().zip(&slopes.by_fixtures) {
-            for (&column, by) in self.fixture_columns[fixture].iter().zip(by.column_iter()) {
-                rows.put_if(column, || by.into_owned());
+            for (axis, regressor, column) in &self.fixture_columns[fixture] {
+                rows.add(*column, &(by.column(*axis) * regressor.value(&pose.setup)));
             }
         }
         rows.put(last_column, &(slopes.value - pose.measured));

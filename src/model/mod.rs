@@ -140,7 +140,9 @@ impl Model {
                 ParameterSite::Joint { field, .. } => {
                     field.is_geometry() || field.motion().is_some()
                 }
-                ParameterSite::Shift { .. } | ParameterSite::Turn { .. } => true,
+                ParameterSite::Shift { .. }
+                | ParameterSite::Turn { .. }
+                | ParameterSite::FixtureShift { .. } => true,
                 _ => false,
             };
             model.parameters.push(Parameter {
@@ -357,7 +359,8 @@ impl Model {
         self.declared.get(fixture).map_or(&[], |fixture| &fixture.points)
     }
 
-    /// Returns the numbers of all points, anchors, surfaces, cameras and markers at `x`.
+    /// Returns the numbers of all points, anchors, surfaces, cameras and markers at `x`, without
+    /// what laws add to them in single rows.
     pub(crate) fn fixtures(&self, x: &[f64]) -> Vec<FixtureValues<f64>> {
         let mut fixtures = self.fixtures.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {

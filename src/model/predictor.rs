@@ -8,7 +8,7 @@ use super::instrument::Instrument;
 use super::pose::Pose;
 use super::tilt::{TiltDerivatives, rigid_frame_axes};
 use crate::mechanics::{Arm, StaticState, Workspace};
-use crate::observation::{FixtureValues, Needs, Observation, Scene};
+use crate::observation::{FixtureValues, Needs, Scene};
 use crate::problem::PoseView;
 use crate::spatial::{Frame, rotation_axes, rotation_between};
 
@@ -150,7 +150,7 @@ impl<'m> Predictor<'m> {
                 Scene { target, base: base.axes, ..Scene::default() }
             }
         };
-        let fixtures = fixtures_of(observation, |fixture| self.fixtures[fixture]);
+        let fixtures = self.instrument.fixtures(pose, &self.fixtures);
         Some(Prediction {
             numbers: observation.predict(&Scene { fixtures, ..scene }),
             orientation_error: turn,
@@ -185,13 +185,4 @@ impl<'m> Predictor<'m> {
             tilts.get_or_insert_with(|| TiltDerivatives::new(model, x, arm.clone(), Vec::new()));
         tilts.axes(&setup, frame)
     }
-}
-
-/// Returns the values of the (at most two) fixtures that a row refers to; the others are default.
-#[inline]
-pub(super) fn fixtures_of(
-    observation: Observation,
-    values: impl Fn(usize) -> FixtureValues<f64>,
-) -> [FixtureValues<f64>; 2] {
-    observation.fixtures().map(|fixture| fixture.map(&values).unwrap_or_default())
 }

@@ -66,6 +66,7 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
         ParameterSite::Base { .. }
         | ParameterSite::Target { .. }
         | ParameterSite::Fixture { .. }
+        | ParameterSite::FixtureShift { .. }
         | ParameterSite::Shift { .. }
         | ParameterSite::Turn { .. }
         | ParameterSite::Exposure { .. }
@@ -168,6 +169,7 @@ pub(super) fn set_site<S: Scalar>(
         ParameterSite::Base { .. }
         | ParameterSite::Target { .. }
         | ParameterSite::Fixture { .. }
+        | ParameterSite::FixtureShift { .. }
         | ParameterSite::Shift { .. }
         | ParameterSite::Turn { .. }
         | ParameterSite::Exposure { .. }

@@ -9,7 +9,7 @@ use super::effect::example;
 use super::item::{Document, Item};
 use super::law;
 use super::section::Section;
-use super::{Data, Effect, EffectDeclaration, Fixture, Joint, Problem, Statics};
+use super::{Data, Effect, EffectDeclaration, Fixture, Joint, Problem, Statics, named_cameras};
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::laws::{Argument, FAMILIES, LAW, NAMES};
 
@@ -18,11 +18,12 @@ pub(super) fn read(
     root: &mut Section<'_, '_>,
     joints: &[Joint],
     data: &Data,
+    fixtures: &[Fixture],
 ) -> Result<Vec<EffectDeclaration>, InputError> {
     let mut effects: Vec<EffectDeclaration> = Vec::new();
     for section in root.sections("effect")? {
         let (name, item) = only_entry(&section)?;
-        let effect = declared(name, &item, joints, data)?;
+        let effect = declared(name, &item, joints, data, fixtures)?;
         let is_same = |known: &&EffectDeclaration| known.effect.is_same_as(&effect);
         if let Some(first) = effects.iter().find(is_same) {
             let line = first.location.line.unwrap_or(0);
@@ -55,8 +56,7 @@ pub(super) fn check_cameras(
     effects: &[EffectDeclaration],
     fixtures: &[Fixture],
 ) -> Result<(), InputError> {
-    let cameras = fixtures.iter().filter(|fixture| fixture.kind.word() == "camera");
-    let known: Vec<String> = cameras.map(|camera| camera.name.clone()).collect();
+    let known: Vec<String> = named_cameras(fixtures).into_iter().map(|(name, _)| name).collect();
     for EffectDeclaration { effect, location } in effects {
         if let Some(name) = effect.camera().filter(|name| !known.contains(name)) {
             let kind = InputErrorKind::UnknownFixture { what: "camera", name, known };
@@ -139,7 +139,7 @@ fn parse_written(
     let section = Section::new(&document, String::new(), 0..0, table.get_ref());
     let (name, item) = only_entry(&section)?;
     let declared = EffectDeclaration {
-        effect: self::declared(name, &item, &problem.joints, &problem.data)?,
+        effect: self::declared(name, &item, &problem.joints, &problem.data, &problem.fixtures)?,
         location: item.location(),
     };
     check_alone(&declared, problem.statics, &problem.joints, &problem.data)?;
@@ -193,8 +193,13 @@ pub(crate) fn declared(
     item: &Item<'_, '_>,
     joints: &[Joint],
     data: &Data,
+    fixtures: &[Fixture],
 ) -> Result<Effect, InputError> {
-    if name == LAW { law::read(item.section()?, joints, data) } else { effect(name, item, joints) }
+    if name == LAW {
+        law::read(item.section()?, joints, data, fixtures)
+    } else {
+        effect(name, item, joints)
+    }
 }
 
 /// Reads an effect of the catalogue; the value `true` means no arguments.

@@ -13,6 +13,7 @@ use super::frame::frame_word;
 use super::item::name_of;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
+use crate::laws::NamedCamera;
 use crate::observation::{Content, Field, FixtureKind, Observation};
 use crate::quantity::Unit;
 use crate::spatial::MAX_NORMAL_TILT;
@@ -78,6 +79,12 @@ pub(crate) fn reference_cells(
         };
         (field, word)
     })
+}
+
+/// Returns the names of the cameras among `fixtures`, each with the names of its numbers.
+pub(crate) fn named_cameras(fixtures: &[Fixture]) -> Vec<NamedCamera> {
+    let cameras = fixtures.iter().filter(|fixture| fixture.kind.word() == "camera");
+    cameras.map(|camera| (camera.name.clone(), camera.kind.fields())).collect()
 }
 
 /// Returns the word of the frame that carries a camera or marker, "world" for the measuring frame.

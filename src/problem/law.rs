@@ -2,10 +2,10 @@
 
 use super::item::Item;
 use super::section::Section;
-use super::{Data, Joint, JointKind, beam_names};
+use super::{Data, Fixture, FixtureKind, Joint, JointKind, beam_names, named_cameras};
 use crate::error::{InputError, InputErrorKind};
 use crate::laws::expression::{FormulaError, Vocabulary};
-use crate::laws::{At, BeamField, Effect, Law, LawParameter, LawPrior, LawSite};
+use crate::laws::{At, BeamField, Effect, FOCAL, Law, LawParameter, LawPrior, LawSite};
 use crate::quantity::Unit;
 
 /// Maximum number of terms of one law.
@@ -15,11 +15,12 @@ const MAX_LAW_PARAMETERS: usize = 20;
 /// Keys of a law other than the prior, whose key has a unit suffix.
 const LAW_KEYS: [&str; 3] = ["name", "at", "terms"];
 
-/// Reads a law for an arm with these joints and data with these covariates.
+/// Reads a law for an arm with these joints and cameras, and data with these covariates.
 pub(super) fn read(
     mut section: Section<'_, '_>,
     joints: &[Joint],
     data: &Data,
+    fixtures: &[Fixture],
 ) -> Result<Effect, InputError> {
     let name = section.require("name", "name = \"…\", a word for its parameters")?;
     let at = section.require("at", "at = \"joint1\", the site that the law adds to")?;
@@ -28,7 +29,7 @@ pub(super) fn read(
     let names: Vec<(String, usize)> =
         joints.iter().enumerate().map(|(k, joint)| (joint.name.clone(), k)).collect();
     let links = beam_names(joints);
-    let site = LawSite::parse(at.text()?, joints.len(), &names, &links)
+    let site = LawSite::parse(at.text()?, joints.len(), &names, &links, &named_cameras(fixtures))
         .map_err(|reason| at.error(InputErrorKind::LawSite { reason }))?;
     let prior = read_prior(&mut section, law_unit(site.at, site.joint(), joints))?;
     let parameters = read_parameters(&mut section)?;
@@ -90,6 +91,11 @@ pub(crate) fn law_unit(at: At, joint: Option<usize>, joints: &[Joint]) -> Unit {
         }
         At::Beam(BeamField::Stretch) => Unit::Ratio,
         At::Beam(_) => Unit::PerLength,
+        At::Camera(FOCAL) => Unit::Pixel,
+        At::Camera(field) => [FixtureKind::Camera, FixtureKind::Fisheye]
+            .iter()
+            .find_map(|kind| Some(kind.unit(kind.fields().iter().position(|name| *name == field)?)))
+            .unwrap_or(Unit::Number),
         _ => Unit::Length,
     }
 }

@@ -53,7 +53,9 @@ pub use conditions::PoseRanges;
 pub(crate) use constraints::{Constraint, Limit, LimitKind};
 pub(crate) use dialect::{ColumnRule, ColumnSelector, Delimiter, Dialect, Missing, RotationKind};
 pub(crate) use edit::with_remainder;
-pub(crate) use fixture::{CENTRE_X, FIRST_COEFFICIENT, FOCAL_X, Fixture, KnownDistance};
+pub(crate) use fixture::{
+    CENTRE_X, FIRST_COEFFICIENT, FOCAL_X, Fixture, KnownDistance, named_cameras,
+};
 pub(crate) use joint::{Body, beam_names};
 pub(crate) use joint_log::{JoinRule, JointLog};
 pub(crate) use joint_source::JointSource;

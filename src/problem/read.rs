@@ -111,7 +111,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let drift = parameters::read_drift(&mut root)?;
     let constraints = constraints::read(&mut root)?;
     let data = data::read(&mut root)?;
-    let effects = effects::read(&mut root, &joints, &data)?;
+    let effects = effects::read(&mut root, &joints, &data, &fixtures)?;
     let robust = robust::read(&mut root)?;
     let remainder = remainder::read(&mut root)?;
     root.finish()?;

@@ -34,6 +34,10 @@ pub(super) enum Dividend {
     Curvature,
     /// Strain of a link.
     Strain,
+    /// Number of pixels.
+    Pixel,
+    /// Number without a unit, such as a coefficient of a lens.
+    Number,
 }
 
 impl Quotient {
@@ -52,7 +56,8 @@ impl Quotient {
         let dividend = match self.of {
             Dividend::Angle => "rad",
             Dividend::Length => "m",
-            Dividend::Curvature | Dividend::Strain => "",
+            Dividend::Pixel => "px",
+            Dividend::Curvature | Dividend::Strain | Dividend::Number => "",
         };
         self.written(dividend, "s")
     }
@@ -68,6 +73,8 @@ impl Quotient {
             (Dividend::Length, ..=1) => (1e3, "mm"),
             (Dividend::Length, _) => (1e6, "µm"),
             (Dividend::Strain, _) => (1e6, "10⁻⁶"),
+            (Dividend::Pixel, _) => (1.0, "px"),
+            (Dividend::Number, _) => (1.0, ""),
         };
         if self.per_row || self.powers[SECOND] <= 0 {
             return (factor, self.written(dividend, "s"));
@@ -144,6 +151,8 @@ mod tests {
             (Dividend::Curvature, [0, 2, 0, 0, 0, 2, 0], "1/(m·(N·m)²)", "µrad/(m·(N·m)²)"),
             (Dividend::Strain, [0, 0, 2, 0, 0, 0, 0], "1/K²", "10⁻⁶/K²"),
             (Dividend::Length, [0, 2, 0, 0, 0, 0, 0], "m/m²", "mm/m²"),
+            (Dividend::Pixel, [0, 0, 1, 0, 0, 0, 0], "px/K", "px/K"),
+            (Dividend::Number, [0, 0, 1, 0, 0, 0, 0], "1/K", "1/K"),
         ] {
             let unit = Quotient::new(of, powers);
             assert_eq!((unit.symbol().as_str(), unit.shown().1.as_str()), (symbol, shown));

@@ -300,6 +300,8 @@ impl Unit {
             Self::Length => Dividend::Length,
             Self::PerLength => Dividend::Curvature,
             Self::Ratio => Dividend::Strain,
+            Self::Pixel => Dividend::Pixel,
+            Self::Number => Dividend::Number,
             other => return other,
         };
         Self::Quotient(Quotient::new(of, powers))

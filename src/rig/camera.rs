@@ -8,7 +8,10 @@ use super::draw::{Row, between, rounded_command};
 use super::equilibrium::Equilibrium;
 use super::truth::Truth;
 use super::{NoEquilibrium, Rig};
-use crate::problem::{Fixture, FixtureKind, JointKind, Observation, PoseConditions};
+use crate::laws::{At, FOCAL, Law};
+use crate::problem::{
+    CENTRE_X, Effect, FOCAL_X, Fixture, FixtureKind, JointKind, Observation, PoseConditions,
+};
 use crate::random::normal;
 use crate::spatial::Frame;
 
@@ -97,6 +100,7 @@ impl Rig {
         };
         let mut seen = Vec::new();
         for (camera, lens) in numbered(&self.arm.fixtures, "camera") {
+            let lens = &self.lens(lens, conditions);
             let of_camera = of_fixture(lens).ok_or(NoEquilibrium)?;
             for (marker, board) in numbered(&self.arm.fixtures, "marker") {
                 if lens.carrier == board.carrier {
@@ -113,6 +117,42 @@ impl Rig {
             }
         }
         Ok(seen)
+    }
+
+    /// Returns a camera with its numbers in a pose, as laws and effects change them.
+    fn lens(&self, declared: &Fixture, conditions: &PoseConditions) -> Fixture {
+        let mut lens = declared.clone();
+        let mut add = |axis: usize, by: f64| {
+            if by != 0.0
+                && let Some(number) = lens.known.get_mut(axis)
+            {
+                *number = Some(number.unwrap_or(0.0) + by);
+            }
+        };
+        let is_of = |camera: &String| *camera == declared.name;
+        let fields = declared.kind.fields().iter().copied().enumerate();
+        for (axis, field) in fields.chain([(FOCAL_X, FOCAL), (FOCAL_X + 1, FOCAL)]) {
+            let is_there =
+                |law: &Law| law.at() == At::Camera(field) && law.camera() == Some(&declared.name);
+            add(axis, self.added_by_laws(conditions, is_there));
+        }
+        for effect in self.effect_values() {
+            match effect {
+                (Effect::LensThermalDrift { camera }, [rate]) if is_of(camera) => {
+                    let change = rate * self.warming(conditions);
+                    (FOCAL_X..CENTRE_X).for_each(|axis| add(axis, change));
+                }
+                (Effect::LensSag { camera, joint }, [x_sin, x_cos, y_sin, y_cos])
+                    if is_of(camera) =>
+                {
+                    let (sin, cos) = conditions.configuration[joint - 1].sin_cos();
+                    add(CENTRE_X, x_sin * sin + x_cos * cos);
+                    add(CENTRE_X + 1, y_sin * sin + y_cos * cos);
+                }
+                _ => {}
+            }
+        }
+        lens
     }
 }
 

@@ -155,6 +155,10 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
         Effect::TrackerDrift => xyz(Unit::Speed),
         Effect::RollingShutter { .. } => named(&[("delay", Unit::Time), ("row", Unit::Time)]),
+        Effect::LensThermalDrift { .. } => named(&[("rate", Unit::Pixel)]),
+        Effect::LensSag { .. } => {
+            named(&["cx_sin", "cx_cos", "cy_sin", "cy_cos"].map(|name| (name, Unit::Pixel)))
+        }
         Effect::PayloadPosition | Effect::StationShift { .. } | Effect::TrackerSettling { .. } => {
             xyz(Unit::Length)
         }

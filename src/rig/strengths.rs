@@ -2,7 +2,7 @@
 
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::laws::LAW;
+use crate::laws::{LAW, Need};
 use crate::problem::effect::NAMES;
 use crate::problem::effects::{declared, effect, gives_way};
 use crate::problem::item::Item;
@@ -46,7 +46,7 @@ fn located_effect(
     let cause = if name == OUTSIDE {
         outside(&item, problem)?
     } else if name == LAW {
-        Cause::Catalogued(declared(name, &item, &problem.joints, &problem.data)?)
+        Cause::Catalogued(declared(name, &item, &problem.joints, &problem.data, &problem.fixtures)?)
     } else {
         Cause::Catalogued(effect(name, &item, &problem.joints)?)
     };
@@ -56,7 +56,7 @@ fn located_effect(
     {
         return Err(item.error(kind));
     }
-    if matches!(&cause, Cause::Catalogued(effect) if effect.camera().is_some()) {
+    if matches!(&cause, Cause::Catalogued(effect) if effect.has_need(&[Need::Velocities])) {
         return Err(item.error(InputErrorKind::NeedsColumn {
             write: "velocities of the joints; simulated images are of an arm at rest",
         }));

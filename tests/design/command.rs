@@ -279,7 +279,7 @@ fn examples_of_arguments_are_effects_of_the_arm() {
         assert_eq!(read.effect.name(), family.name);
         written += 1;
     }
-    assert_eq!(written, 27);
+    assert_eq!(written, 29);
 }
 
 #[test]

@@ -23,7 +23,7 @@ use crate::common::reading::{
 
 /// Arm of four joints, one of which slides, with a camera on its hand that sees a board in the
 /// world, and a second camera in the world.
-const ARM: &str = r#"
+pub const ARM: &str = r#"
 name = "shutter"
 joint = [
     { d_m = 0.4 },
@@ -82,7 +82,7 @@ const DELAY: f64 = 4e-3;
 const ROW_TIME: f64 = 2e-5;
 
 /// Returns the text of a problem without its elasticity.
-fn rigid(text: &str) -> String {
+pub fn rigid(text: &str) -> String {
     text.replace("stiffness_N_m_per_rad = 4e4, ", "")
         .replace("\"joint*.stiffness\" = { sigma_relative = 0.3 }\n", "")
 }

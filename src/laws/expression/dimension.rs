@@ -46,6 +46,25 @@ pub enum Per {
     Product([i32; BASES]),
 }
 
+impl Per {
+    /// Returns the power of each base unit.
+    pub fn powers(self) -> [i32; BASES] {
+        let of = match self {
+            Self::Number => Dimension::PLAIN,
+            Self::Angle => Dimension::ANGLE,
+            Self::Length => Dimension::LENGTH,
+            Self::Kelvin => Dimension::KELVIN,
+            Self::Mass => Dimension::MASS,
+            Self::Second => Dimension::SECOND,
+            Self::Torque => Dimension::TORQUE,
+            Self::TorqueMass => Dimension::TORQUE_MASS,
+            Self::Covariate => Dimension::COVARIATE,
+            Self::Product(powers) => return powers,
+        };
+        of.powers
+    }
+}
+
 impl Dimension {
     /// Unit of a number without unit.
     pub(super) const PLAIN: Self = Self { powers: [0; BASES], flexible: false, untold: false };

@@ -93,8 +93,7 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
                 beams.map(|beam| Argument::Name(beam.name.clone())).collect()
             }
             ArgumentKind::Camera => {
-                let cameras = problem.fixtures.iter().filter(|of| of.kind.word() == "camera");
-                cameras.map(|camera| Argument::Name(camera.name.clone())).collect()
+                problem.cameras().into_iter().map(|(name, _)| Argument::Name(name)).collect()
             }
             ArgumentKind::Covariate => {
                 let covariates = problem.covariate_names();
@@ -220,6 +219,11 @@ impl Effect {
                 !bends.is_some_and(|beam| beam.ei_y.is_some() || beam.ei_z.is_some())
             }),
             Only::Bodies => is(|joint| Body::total_mass(&joint.bodies) > 0.0),
+            Only::CarriesCamera => {
+                let camera = self.camera().and_then(|name| problem.camera(&name));
+                let carrier = camera.and_then(|camera| problem.fixtures[camera].carrier);
+                self.joint().is_some_and(|joint| carrier.is_some_and(|carrier| joint <= carrier))
+            }
             Only::Undeflected => problem.statics.equilibrium == Equilibrium::Undeflected,
             Only::Hoisted => {
                 let hoisted =

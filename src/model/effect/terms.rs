@@ -2,9 +2,11 @@
 
 use super::coverage::Columns;
 use crate::laws::expression::Vocabulary;
-use crate::laws::{At, Effect, EffectTerm, JointField, LAW, LawParameter, Need, Quantity};
+use crate::laws::{
+    At, Effect, EffectTerm, FOCAL, JointField, LAW, LawParameter, NamedCamera, Need, Quantity,
+};
 use crate::model::parameter::{EffectParameter, ParameterSite, Regressor};
-use crate::problem::{Fixture, JointKind, Problem};
+use crate::problem::{FOCAL_X, JointKind, Problem, named_cameras};
 
 /// Parameter of an effect on an arm, with the site where it enters the model.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,10 +108,18 @@ impl Effect {
             At::Scale => ParameterSite::Scale,
             At::Strain(entry) => ParameterSite::Strain { entry },
             At::Exposure { by_row } => {
-                let name = self.camera()?;
-                let is_named = |of: &Fixture| of.kind.word() == "camera" && of.name == name;
-                let camera = problem.fixtures.iter().position(is_named)?;
-                ParameterSite::Exposure { camera, by_row }
+                ParameterSite::Exposure { camera: problem.camera(&self.camera()?)?, by_row }
+            }
+            At::Camera(field) => {
+                let fixture = problem.camera(&self.camera()?)?;
+                let kind = problem.fixtures.get(fixture)?.kind;
+                let axis = kind.fields().iter().position(|name| *name == field);
+                match axis {
+                    None if field == FOCAL => {
+                        ParameterSite::FixtureShift { fixture, kind, axis: FOCAL_X, count: 2 }
+                    }
+                    axis => ParameterSite::FixtureShift { fixture, kind, axis: axis?, count: 1 },
+                }
             }
         })
     }
@@ -194,6 +204,16 @@ impl Effect {
 }
 
 impl Problem {
+    /// Returns the index of a camera among the fixtures; `None` if none has the name.
+    pub(crate) fn camera(&self, name: &str) -> Option<usize> {
+        self.fixtures.iter().position(|of| of.kind.word() == "camera" && of.name == name)
+    }
+
+    /// Returns the names of the cameras, each with the names of its numbers.
+    pub(crate) fn cameras(&self) -> Vec<NamedCamera> {
+        named_cameras(&self.fixtures)
+    }
+
     /// Returns the names of the covariates, in order of declaration.
     pub(crate) fn covariate_names(&self) -> Vec<String> {
         self.data.covariates.iter().map(|covariate| covariate.name.clone()).collect()

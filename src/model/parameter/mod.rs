@@ -83,6 +83,9 @@ pub(crate) fn unit(site: ParameterSite, regressor: &Regressor) -> Unit {
         return Unit::Number;
     }
     match (regressor.per(), site.unit()) {
+        (per, unit @ (Unit::Pixel | Unit::Number)) if per != Per::Number => {
+            unit.divided_by(per.powers())
+        }
         (Per::Kelvin, Unit::Angle) => Unit::AnglePerDegree,
         (Per::Kelvin, Unit::PerLength) => Unit::CurvaturePerDegree,
         (Per::Kelvin, Unit::Ratio) => Unit::PerDegree,

@@ -50,6 +50,18 @@ pub enum ParameterSite {
         /// Index of the number among the fixture's numbers.
         axis: usize,
     },
+    /// Change of a number of a fixture from row to row, in the order of `FixtureKind::fields`; its
+    /// parameter always has a regressor.
+    FixtureShift {
+        /// Index of the fixture.
+        fixture: usize,
+        /// Kind of the fixture.
+        kind: FixtureKind,
+        /// Index of the number among the fixture's numbers.
+        axis: usize,
+        /// How many numbers from that one on change alike.
+        count: usize,
+    },
     /// Displacement of every measured position, measuring frame.
     Shift {
         /// Axis 0, 1 or 2, or 3 for the line of sight from the origin.
@@ -142,7 +154,9 @@ impl ParameterSite {
             Self::Base { axis, .. } | Self::Target { axis, .. } if axis >= 3 => Unit::Angle,
             Self::Turn { .. } => Unit::Angle,
             Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } => Unit::Length,
-            Self::Fixture { kind, axis, .. } => kind.unit(axis),
+            Self::Fixture { kind, axis, .. } | Self::FixtureShift { kind, axis, .. } => {
+                kind.unit(axis)
+            }
             Self::Exposure { .. } => Unit::Time,
             Self::Scale | Self::Strain { .. } => Unit::Ratio,
         }
@@ -161,6 +175,7 @@ impl ParameterSite {
             Self::Base { .. }
             | Self::Target { .. }
             | Self::Fixture { .. }
+            | Self::FixtureShift { .. }
             | Self::Shift { .. }
             | Self::Turn { .. }
             | Self::Exposure { .. }

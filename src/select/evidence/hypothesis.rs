@@ -54,6 +54,7 @@ impl Site {
             ParameterSite::Base { .. } | ParameterSite::Turn { .. } => Self::Base,
             ParameterSite::Target { .. } => Self::Payload,
             ParameterSite::Fixture { .. }
+            | ParameterSite::FixtureShift { .. }
             | ParameterSite::Exposure { .. }
             | ParameterSite::Shift { .. }
             | ParameterSite::Scale

@@ -12,7 +12,7 @@ use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Products, ReducedProblem};
 use super::search::{EvaluatedSet, reduced_by, sorted};
-use super::sites::tool_site;
+use super::sites::{camera_sites, tool_site};
 use super::waves::is_free;
 use crate::laws::expression::Vocabulary;
 use crate::laws::{Law, LawSite};
@@ -161,7 +161,8 @@ fn effect_of_proposal(problem: &Problem, at: &LawAt, proposal: &Proposal) -> Opt
     let vocabulary =
         Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
     let links = beam_names(&problem.joints);
-    let site = LawSite::parse(&at.name, problem.joints.len(), &[], &links).ok()?;
+    let site =
+        LawSite::parse(&at.name, problem.joints.len(), &[], &links, &problem.cameras()).ok()?;
     let law = |written: &Written| {
         let parameters = written.parameters.clone();
         let site = site.clone();
@@ -275,6 +276,9 @@ fn elsewhere(
         add(format!("tool.{letter}"), tool_site(problem, axis));
         add(format!("measurement.{letter}"), ParameterSite::Shift { axis });
         add(format!("base.r{letter}"), ParameterSite::Turn { axis });
+    }
+    for (name, lever) in camera_sites(problem) {
+        add(name, lever);
     }
     for coordinate in members.iter().filter_map(|&member| of(member).coordinate) {
         let ParameterSite::Joint { joint, field } = coordinate else { continue };

@@ -1,9 +1,10 @@
 //! Parameter sites at which the hypotheses need derivatives.
 
 use super::hypothesis::Site;
+use crate::laws::FOCAL;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
-use crate::problem::Problem;
+use crate::problem::{CENTRE_X, FOCAL_X, Problem};
 
 /// Returns the parameter sites of hypotheses without a law, for which derivatives are needed in
 /// addition to those of the effects.
@@ -13,6 +14,7 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
         (0..3).flat_map(|axis| [ParameterSite::Shift { axis }, ParameterSite::Turn { axis }]),
     );
     sites.extend((0..3).map(|axis| tool_site(problem, axis)));
+    sites.extend(camera_sites(problem).map(|(_, site)| site));
     for joint in 0..problem.joints.len() {
         sites.extend(
             [JointField::Compliance, JointField::LateralX]
@@ -30,6 +32,22 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
 pub(super) fn tool_site(problem: &Problem, axis: usize) -> ParameterSite {
     let joint = problem.tool.joint.min(problem.joints.len().saturating_sub(1));
     ParameterSite::Joint { joint, field: JointField::After(axis) }
+}
+
+/// Returns the sites of changes of the focal lengths and centres of all cameras, with their names in
+/// files.
+pub(super) fn camera_sites(
+    problem: &Problem,
+) -> impl Iterator<Item = (String, ParameterSite)> + '_ {
+    let cameras = problem.fixtures.iter().enumerate();
+    cameras.filter(|(_, of)| of.kind.word() == "camera").flat_map(|(fixture, of)| {
+        [(FOCAL, FOCAL_X, 2), ("cx", CENTRE_X, 1), ("cy", CENTRE_X + 1, 1)].map(
+            |(field, axis, count)| {
+                let site = ParameterSite::FixtureShift { fixture, kind: of.kind, axis, count };
+                (format!("camera[{}].{field}", of.name), site)
+            },
+        )
+    })
 }
 
 /// Returns the sites of the geometric parameters of every joint.
