@@ -21,7 +21,7 @@ impl StartTimes {
         if self.sessions.is_empty() { Some(self.first) } else { self.sessions.get(name).copied() }
     }
 
-    /// Returns true if times are dates, not seconds of a clock with its own zero.
+    /// Returns true if times are dates, not seconds since another start.
     pub(crate) fn are_dates(&self) -> bool {
         self.first >= FIRST_DATE
     }
@@ -36,7 +36,7 @@ impl StartTimes {
 }
 
 impl Measurements {
-    /// Returns true if times were measured and are dates, not seconds of a clock with its own zero.
+    /// Returns true if times were measured and are dates, not seconds since another start.
     #[doc(hidden)]
     pub fn has_dates(&self) -> bool {
         self.time_measured && self.time.iter().all(|&time| time >= FIRST_DATE)
