@@ -249,7 +249,7 @@ fn run(from: u64, count: u64) {
 
 #[test]
 fn commands_stand_a_few_mutated_inputs() {
-    run(0, 240);
+    run(0, 120);
 }
 
 #[test]
