@@ -205,6 +205,11 @@ pub enum TableErrorKind {
          u_px = cx + fx u and v_px = cy + fy v, with the distortion applied"
     )]
     NormalisedPixels { largest: String },
+    #[error(
+        "all numbers of joints and positions are whole, up to {turns} turns and {metres} m: the \
+         decimal points were lost, as by a spreadsheet of another locale; export the table again"
+    )]
+    DecimalsLost { turns: String, metres: String },
     #[error("{value} px is no place in an image; correct the row, or leave it out")]
     NoPlaceInImage { value: String },
     #[error(

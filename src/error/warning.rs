@@ -371,6 +371,11 @@ pub enum WarningKind {
     )]
     ShortDistances { longest: String, links: String },
     #[error(
+        "{other} is usually {here}, near the {declared} that the problem declares for {name}, and \
+         {name} is usually {usual}: the names of the two columns are probably exchanged"
+    )]
+    ColumnsExchanged { name: String, usual: String, declared: String, other: String, here: String },
+    #[error(
         "the payloads divided by 9.80665 are round numbers ({newtons} N is {kilograms} kg); if the \
          column holds newtons, write kilograms"
     )]

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::error::TableErrorKind;
 use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::distance_zero::distance_zero;
 use crate::fit::checks::finding::{Finding, FindingCode};
 use crate::fit::checks::held_fixtures::held_fixture;
 use crate::fit::checks::lens::lens_finding;
@@ -124,9 +125,10 @@ pub fn identify_model(
         let fit = |problem: &Problem| identify(problem, data, &provisional);
         // Wrong intrinsics bend the arm, so that they are the reason of other findings.
         let lens = lens_finding(problem, data, &found, fit);
-        found.findings.splice(0..0, lens);
-        let held = held_fixture(problem, measurements, &found, fit);
-        found.findings.extend(held);
+        let zero = distance_zero(problem, data, &found, |of| identify(problem, of, &provisional));
+        let held = zero.is_none().then(|| held_fixture(problem, measurements, &found, fit));
+        found.findings.splice(0..0, lens.into_iter().chain(zero));
+        found.findings.extend(held.flatten());
         if options.influential_rows {
             found.findings.extend(payload_finding(problem, data, &found, fit));
         }

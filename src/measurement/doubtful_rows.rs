@@ -27,6 +27,12 @@ const MAX_PIXEL: f64 = 1e5;
 /// \[m\].
 const MIN_TURN: f64 = std::f64::consts::PI / 180.0;
 const MIN_TRAVEL: f64 = 1e-3;
+/// Smallest angle of a joint \[rad\], 20 turns, and smallest coordinate \[m\] that show lost
+/// decimal points if all numbers are whole.
+const MIN_LOST_ANGLE: f64 = 20.0 * std::f64::consts::TAU;
+const MIN_LOST_PLACE: f64 = 100.0;
+/// Largest deviation of a whole number from a whole one by conversion of its unit, relative to it.
+const MAX_OFF_WHOLE: f64 = 1e-12;
 /// Maximum number of rows that the warning names in addition to the first.
 const MAX_NAMED_ROWS: usize = 3;
 
@@ -91,6 +97,39 @@ impl Measurements {
             }
             None => Ok(()),
         }
+    }
+
+    /// Checks that the numbers of joints and positions are not whole ones far beyond those of an
+    /// arm, as in a table whose decimal points a spreadsheet took for separators of thousands.
+    pub(super) fn require_decimals(&self, problem: &Problem) -> Result<(), InputError> {
+        let turning = problem.joints.iter().filter(|joint| joint.takes_command());
+        let turns: Vec<bool> = turning.map(Joint::takes_angle).collect();
+        let angles = |row: usize| {
+            let q = self.configuration(row).iter().zip(&turns);
+            q.filter(|(_, turns)| **turns).map(|(q, _)| *q)
+        };
+        let is_position = |row: &usize| self.observation(*row) == Observation::Position;
+        let rows = || (0..self.len()).filter(is_position);
+        let numbers = rows().flat_map(angles);
+        let places = rows().filter_map(|row| self.positions.get(row));
+        let angle = numbers.clone().map(f64::abs).fold(0.0, f64::max);
+        let distance = places.clone().map(|place| place.amax()).fold(0.0, f64::max);
+        if self.len() < MIN_NORMALISED_ROWS || angle < MIN_LOST_ANGLE || distance < MIN_LOST_PLACE {
+            return Ok(());
+        }
+        let is_whole = |value: f64| (value - value.round()).abs() < MAX_OFF_WHOLE * value.abs();
+        let are_degrees = numbers.clone().all(|q| is_whole(q.to_degrees()));
+        let are_radians = numbers.clone().all(is_whole);
+        let unit = self.position_unit.unwrap_or(1e-3);
+        let are_lengths = places.clone().all(|place| place.iter().all(|x| is_whole(x / unit)));
+        if !are_lengths || !(are_degrees || are_radians) {
+            return Ok(());
+        }
+        let kind = TableErrorKind::DecimalsLost {
+            turns: format!("{:.0}", angle / std::f64::consts::TAU),
+            metres: format!("{distance:.0}"),
+        };
+        Err(self.location(0).error(kind))
     }
 
     /// Returns a warning at the first pixel that lies outside the declared size of its image.

@@ -17,6 +17,10 @@ const GRAVITY: f64 = 9.80665;
 /// Largest relative difference between g times the median of the column `hoist_N` and the declared
 /// hoist force, at which the column is probably in kilograms.
 const MAX_HOIST_DIFFERENCE: f64 = 0.2;
+/// Largest ratio of the median of a column to a declared number at which the two are near.
+const MAX_NEAR_RATIO: f64 = 1.5;
+/// Smallest ratio of the median of a column to its declared number at which the two are far apart.
+const MIN_FAR_RATIO: f64 = 5.0;
 /// Smallest distance of the reference temperature from all temperatures that is reported \[K\].
 const MIN_FAR_REFERENCE: f64 = 40.0;
 /// Step of round payloads \[kg\].
@@ -106,6 +110,47 @@ impl Measurements {
             declared: format!("{declared}"),
         };
         ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then(|| self.warning(0, "hoist_N", kind))
+    }
+
+    /// Returns a warning, located at the first row, if the numbers of one column of loads or
+    /// temperatures are near what the problem declares for another one, whose numbers are not.
+    pub(super) fn exchanged_loads(&self, problem: &Problem) -> Option<Warning> {
+        let hoists = problem.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
+        let force = hoists.map(|hoist| hoist.force).find(|force| *force != 0.0);
+        let payload = Some(problem.tool.payload_mass).filter(|mass| *mass > 0.0);
+        let columns = [
+            ("payload_kg", &self.payload, payload),
+            ("hoist_N", &self.hoist, force),
+            ("temperature_C", &self.temperature, problem.data.reference_temperature),
+        ];
+        let median = |values: &Option<Vec<f64>>| {
+            let mut values = values.clone()?;
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied()
+        };
+        let is_near = |value: f64, declared: f64| {
+            let ratio = value / declared;
+            (1.0 / MAX_NEAR_RATIO..=MAX_NEAR_RATIO).contains(&ratio)
+        };
+        let is_far = |value: f64, declared: f64| {
+            !(1.0 / MIN_FAR_RATIO..=MIN_FAR_RATIO).contains(&(value / declared))
+        };
+        columns.iter().find_map(|(name, values, declared)| {
+            let (usual, declared) = (median(values)?, (*declared)?);
+            columns.iter().filter(|_| is_far(usual, declared)).find_map(|(other, values, of)| {
+                let found = median(values)?;
+                let is_other = other != name && is_near(found, declared);
+                let fits = of.is_none_or(|of| !is_near(found, of));
+                let kind = WarningKind::ColumnsExchanged {
+                    name: (*name).to_owned(),
+                    usual: about_three_digits(usual),
+                    declared: about_three_digits(declared),
+                    other: (*other).to_owned(),
+                    here: about_three_digits(found),
+                };
+                (is_other && fits).then(|| self.warning(0, *name, kind))
+            })
+        })
     }
 
     /// Returns a warning, located at the first payload, if the payloads are round numbers of

@@ -337,6 +337,7 @@ impl<'a> Tables<'a> {
                 }
                 measurements.require_moving_views(problem)?;
                 measurements.require_pixels(problem)?;
+                measurements.require_decimals(problem)?;
                 observed::add_known_distances(&mut measurements, problem)?;
                 let commands = commands(&columns);
                 warnings.extend(measurements.many_turns(problem, &commands));
@@ -348,7 +349,9 @@ impl<'a> Tables<'a> {
                 warnings.extend(measurements.fahrenheit(problem));
                 warnings.extend(measurements.far_reference(problem));
                 warnings.extend(measurements.approach_without_sign());
-                warnings.extend(measurements.hoist_in_kilograms(problem));
+                let exchanged = measurements.exchanged_loads(problem);
+                let in_kilograms = measurements.hoist_in_kilograms(problem);
+                warnings.extend(exchanged.or(in_kilograms));
                 warnings.extend(measurements.few_degrees(problem, &commands));
                 warnings.extend(measurements.milliseconds());
                 warnings.extend(measurements.heavy_payload(problem));

@@ -258,3 +258,28 @@ fn a_fixture_that_lies_far_from_its_prior_is_named() {
         assert!(text.contains("correct it in [[anchor]] \"A\": at_m = [1.5"), "{text}");
     }
 }
+
+#[test]
+fn a_wire_whose_zero_is_wrong_is_named() {
+    let at = |around: String, (name, at): (&str, [f64; 3])| {
+        let anchor = format!("[[anchor]]\nname = \"{name}\"\n");
+        around.replace(&anchor, &format!("{anchor}at_m = {at:?}\n"))
+    };
+    let around = ANCHORS.into_iter().fold(AROUND.to_owned(), at);
+    let held = "\"anchor*\" = { fixed = true }\n\"base.*\" = { fixed = true }\n";
+    let problem = problem(&format!("{held}{around}"));
+    let (arm, _) = true_arm(&problem, 5);
+    let table = Bench::new(arm, 11).table(&["distance"], 60);
+    let wrong = table.lines().map(|line| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Some(place) = cells.iter().position(|cell| cell == "B") {
+            let distance: f64 = cells[place + 1].parse().unwrap();
+            cells[place + 1] = (distance + 80.0).to_string();
+        }
+        cells.join(",") + "\n"
+    });
+    let data = read_dataset(&problem, &wrong.collect::<String>());
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let first = found.first_error().map(ToString::to_string).unwrap_or_default();
+    assert!(first.contains("with distances to B that are 80.0 mm too large"), "{first}");
+}

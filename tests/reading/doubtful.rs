@@ -89,6 +89,42 @@ fn sessions_that_differ_in_case_alone_are_named() {
 }
 
 #[test]
+fn decimal_points_that_a_spreadsheet_lost_are_named() {
+    let text = format!("{HEADER}{}", rows(20, "A", 3));
+    assert!(try_table(&arm(), &text).is_ok());
+    let error = table_error(&arm(), &text.replace('.', ""));
+    assert_says(&error, &["rows.csv:2: all numbers of joints and positions are whole, up to "]);
+    assert_says(&error, &["the decimal points were lost"]);
+    // Counts of encoders are whole, the positions beside them are not.
+    let counts = text.lines().enumerate().map(|(k, line)| {
+        let cells = line.split(',').enumerate().map(|(place, cell)| {
+            if k > 0 && place < 3 { cell.replace('.', "") } else { cell.to_owned() }
+        });
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    });
+    assert!(try_table(&arm(), &counts.collect::<String>()).is_ok());
+}
+
+#[test]
+fn exchanged_columns_of_loads_are_asked_about() {
+    let hoist = "[joint.beam]\nname = 'A'\nEA_N = 1e7\nEIy_N_m2 = 1e4\nEIz_N_m2 = 1e4\n\
+                 GJ_N_m2 = 1e4\n[joint.beam.hoist]\nat_m = [0.2, 0, 0]\nforce_N = 62\n";
+    let problem = parse(&format!("{ARM}{hoist}[data]\nposition_sigma_mm = 0.05\n"));
+    for (payload, force, is_exchanged) in [(60.0, 1.0, true), (1.0, 60.0, false)] {
+        let text = rows(12, "A", 4);
+        let line = |(k, line): (usize, &str)| {
+            let part = k as f64 / 8.0;
+            format!("{line},{},{}\n", payload + part, force + part)
+        };
+        let lines: String = text.lines().enumerate().map(line).collect();
+        let header = HEADER.replace('\n', ",payload_kg,hoist_N\n");
+        let found = try_table(&problem, &(header + &lines)).unwrap().1;
+        let is_named = |of: &Warning| matches!(of.kind, WarningKind::ColumnsExchanged { .. });
+        assert_eq!(found.iter().any(is_named), is_exchanged, "{found:?}");
+    }
+}
+
+#[test]
 fn columns_in_other_units_are_named() {
     let with = |column: &str, values: &[&str], problem: &Problem| {
         let text = rows(values.len(), "A", 4);

@@ -83,6 +83,33 @@ fn dates_are_paired_with_milliseconds_since_the_start_of_a_controller() {
 }
 
 #[test]
+fn numbers_in_a_column_of_times_without_a_unit_are_named() {
+    for (time, words) in [
+        ("1742289126700", "a number of milliseconds since 1970, 2025-03-18 09:12:06; call"),
+        (
+            "1742289126",
+            "a number of seconds since 1970, 2025-03-18 09:12:06; call the column time_s",
+        ),
+        ("45734.383414", "a day number of a spreadsheet, 2025-03-18 09:12:07; format the column"),
+        ("739694.383414", "a day number of MATLAB, 2025-03-18 09:12:07"),
+        ("12.5", "a number without a unit; call the column time_s"),
+    ] {
+        let text = format!(
+            "{ARM}[data]\nfiles = ['tracker.csv']\n\
+             joints = {{ files = ['log.csv'], by = 'time' }}\n"
+        );
+        let folder = Folder::with([
+            ("problem.toml", &*text),
+            ("tracker.csv", &*format!("x_mm,y_mm,z_mm,time\n1,2,3,{time}\n2,2,3,{time}\n")),
+            ("log.csv", "time,q1_deg,q2_deg\n2026-03-11T09:00:00,1,2\n2026-03-11T09:01:00,1,3\n"),
+        ]);
+        let problem = Problem::read(&folder.path("problem.toml")).unwrap();
+        let error = Measurements::read(&problem.data.files, &problem).unwrap_err();
+        assert_says(&error, &["tracker.csv:2: column time: ", words]);
+    }
+}
+
+#[test]
 fn errors_show_the_line_of_the_file_they_name() {
     let shown = |error: InputError| {
         let excerpt = error.location.excerpt.clone().unwrap();

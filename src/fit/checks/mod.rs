@@ -9,6 +9,7 @@ pub(super) mod checked_fit;
 mod common_scale;
 mod contradicted_entry;
 mod convention;
+pub(super) mod distance_zero;
 mod doubted_columns;
 mod doubted_rows;
 pub(super) mod finding;
@@ -289,6 +290,14 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             && found.word("parameter").is_some_and(|name| name.contains('['))
     });
     for finding in findings {
+        let has_readings = finding.value("explanations").and_then(Value::as_array);
+        if finding.code == FindingCode::NominalFarOff
+            && is_of_fixture
+            && has_readings.is_none_or(Vec::is_empty)
+        {
+            let remedy = "follow first what another finding (beyond-prior) says";
+            *finding = finding.clone().with_remedy(remedy.to_owned());
+        }
         // Remedies that name a cause stay.
         if finding.remedy != finding.code.entry().remedy {
             continue;

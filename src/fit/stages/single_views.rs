@@ -121,13 +121,41 @@ fn median(mut numbers: Vec<f64>) -> Option<f64> {
 ///
 /// With R rows of C points, point r C + c of the file has the number c R + r.
 pub(in crate::fit) fn transposed(points: &[Vector3<f64>], point: usize) -> Option<usize> {
+    let [rows, columns] = grid(points)?;
+    Some(point % rows * columns + point / rows)
+}
+
+/// Returns the number of the point that has the number `point` if a grid is declared by its squares
+/// and a detector counts the corners between them, one fewer in each row and column; `None` if the
+/// points form no grid that is numbered row by row, or if it has no such corner.
+pub(in crate::fit) fn between_squares(points: &[Vector3<f64>], point: usize) -> Option<usize> {
+    let [rows, columns] = grid(points)?;
+    let inner = columns.checked_sub(1).filter(|inner| *inner > 1)?;
+    (point < inner * (rows - 1)).then_some(point / inner * columns + point % inner)
+}
+
+/// Returns the numbers of rows and columns of a grid that is numbered row by row; `None` for other
+/// points.
+fn grid(points: &[Vector3<f64>]) -> Option<[usize; 2]> {
     let step = points.get(1)? - points[0];
     let is_next =
         |pair: &&[Vector3<f64>]| (pair[1] - pair[0] - step).norm() <= MAX_GRID_ERROR * step.norm();
     let columns = 1 + points.windows(2).take_while(is_next).count();
     let rows = points.len() / columns;
-    if rows < 2 || rows * columns != points.len() {
-        return None;
+    (rows > 1 && rows * columns == points.len()).then_some([rows, columns])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_between_squares_are_points_of_the_grid() {
+        let points: Vec<Vector3<f64>> =
+            (0..12).map(|k| Vector3::new(f64::from(k % 4), f64::from(k / 4), 0.0)).collect();
+        let meant: Vec<Option<usize>> = (0..7).map(|k| between_squares(&points, k)).collect();
+        let corners = [0, 1, 2, 4, 5, 6].map(Some);
+        assert_eq!(meant, [&corners[..], &[None]].concat());
+        assert_eq!(between_squares(&points[..5], 0), None);
     }
-    Some(point % rows * columns + point / rows)
 }

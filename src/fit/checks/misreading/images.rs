@@ -2,7 +2,7 @@
 
 use super::Misreading;
 use super::candidates::MAX_OTHER_CARRIERS;
-use crate::fit::stages::single_views::transposed;
+use crate::fit::stages::single_views::{between_squares, transposed};
 use crate::measurement::Measurements;
 use crate::observation::FixtureKind;
 use crate::problem::{Fixture, Observation, Problem};
@@ -17,6 +17,13 @@ pub(in crate::fit) fn is_of_views(table: &Measurements) -> bool {
 pub(super) fn of_images(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
     let is_first = |row| matches!(table.observation(row), Observation::Pixel(.., 0));
     let from_one = (!(0..table.len()).any(is_first)).then_some(Misreading::FromOne);
+    let is_inner = |row: usize| {
+        let Observation::Pixel(_, marker, point) = table.observation(row) else { return true };
+        let marker = problem.fixtures.get(marker as usize);
+        marker.is_some_and(|of| between_squares(&of.points, point as usize).is_some())
+    };
+    let squares = (0..table.len()).all(is_inner).then_some(Misreading::Squares);
+    let from_one = from_one.into_iter().chain(squares);
     let shifts = [-1, 1].map(|by| Misreading::ShiftedViews { by });
     let axes = [Misreading::ExchangedAxes, Misreading::FromBottom, Misreading::Transposed];
     let mut misreadings: Vec<Misreading> = axes.into_iter().chain(shifts).chain(from_one).collect();
@@ -57,7 +64,9 @@ impl Misreading {
                 }
                 _ => {
                     let points = problem.fixtures.get(marker as usize).map(|of| &of.points[..]);
-                    let other = points.and_then(|points| transposed(points, point as usize));
+                    let is_squares = matches!(self, Self::Squares);
+                    let meant = if is_squares { between_squares } else { transposed };
+                    let other = points.and_then(|points| meant(points, point as usize));
                     if let Some(other) = other.and_then(|other| u32::try_from(other).ok()) {
                         *observation = Observation::Pixel(camera, marker, other);
                     }

@@ -326,6 +326,8 @@ pub enum Misreading {
     Transposed,
     /// The points of a marker are numbered from 1 instead of 0.
     FromOne,
+    /// The points of a marker are declared by squares, and corners between them are numbered.
+    Squares,
     /// Images belong to the configuration of another view.
     ShiftedViews {
         /// Number of views by which an image comes too late.

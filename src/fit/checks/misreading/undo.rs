@@ -331,7 +331,11 @@ impl Misreading {
                     *position = -(*turn * *position);
                 }
             }
-            Self::ExchangedAxes | Self::FromBottom | Self::Transposed | Self::FromOne => {
+            Self::ExchangedAxes
+            | Self::FromBottom
+            | Self::Transposed
+            | Self::FromOne
+            | Self::Squares => {
                 self.undo_image(&mut rows, problem);
             }
             Self::ExchangedTargets { target, with } => {

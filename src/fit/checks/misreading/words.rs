@@ -313,6 +313,9 @@ impl fmt::Display for Misreading {
             Self::FromOne => {
                 f.write_str("points of the marker that are numbered from 1 (point counts from 0)")
             }
+            Self::Squares => f.write_str(
+                "points_mm that count the squares of the board (declare its inner corners)",
+            ),
             Self::ShiftedViews { by } => {
                 let (views, side) = (by.unsigned_abs(), if by > 0 { "before" } else { "after" });
                 let plural = if views == 1 { "" } else { "s" };
