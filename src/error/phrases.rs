@@ -144,6 +144,22 @@ pub(super) fn missed(miss: f64) -> String {
     }
 }
 
+/// Returns the other numbering of a marker's points with its remedy: two corners of a tag are
+/// exchanged, or else the grid is counted along its other side.
+pub(super) fn renumbered(crossed: Option<[usize; 2]>) -> String {
+    match crossed {
+        Some([a, b]) => format!(
+            "corners {a} and {b} exchanged: the order of points_mm crosses the tag, but detectors go \
+             round it; exchange points {a} and {b} of points_mm"
+        ),
+        None => {
+            "corners along and across exchanged; declare points_mm as the detector counts them, \
+                 columns and rows exchanged"
+                .to_owned()
+        }
+    }
+}
+
 /// Returns the remedy for a point behind the camera. `fits` is true if the points of the images fit
 /// the marker by themselves, which they miss by `miss` \[px\]. `few` is the largest number of points
 /// in an image if that is too small for a pose, otherwise 0.

@@ -49,7 +49,7 @@ mod view_order;
 use serde_json::Value;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
-use finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, OF_MISFIT};
+use finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, OF_MISFIT, Severity};
 use misreading::first_of;
 
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
@@ -83,6 +83,7 @@ const CHECKS: &[&dyn Check] = &[
     &priors::SigmaIsNotOverstated,
     &prediction::PredictionHolds,
     &prediction::NotWorseThanNominal,
+    &prediction::PredictionIsSure,
     &bounds::BoundsAreSeen,
     &limits::LimitsHold,
     &held_parameters::HeldGeometryIsRight,
@@ -225,6 +226,15 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         }
     }
     state_held_out_remedies(&mut findings);
+    // Other findings say more of the held-out rows.
+    let says_more = |found: &Finding| {
+        found.code.entry().severity == Severity::Error
+            || [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutOutliers]
+                .contains(&found.code)
+    };
+    if findings.iter().any(says_more) {
+        findings.retain(|found| found.code != FindingCode::HeldOutUncertain);
+    }
     findings
 }
 

@@ -2,7 +2,7 @@
 
 use super::Misreading;
 use super::candidates::MAX_OTHER_CARRIERS;
-use crate::fit::stages::single_views::transposed;
+use crate::fit::stages::single_views::Numbering;
 use crate::measurement::Measurements;
 use crate::observation::FixtureKind;
 use crate::problem::{Fixture, Observation, Problem};
@@ -18,8 +18,12 @@ pub(super) fn of_images(problem: &Problem, table: &Measurements) -> Vec<Misreadi
     let is_first = |row| matches!(table.observation(row), Observation::Pixel(.., 0));
     let from_one = (!(0..table.len()).any(is_first)).then_some(Misreading::FromOne);
     let shifts = [-1, 1].map(|by| Misreading::ShiftedViews { by });
-    let axes = [Misreading::ExchangedAxes, Misreading::FromBottom, Misreading::Transposed];
-    let mut misreadings: Vec<Misreading> = axes.into_iter().chain(shifts).chain(from_one).collect();
+    let axes = [Misreading::ExchangedAxes, Misreading::FromBottom];
+    let markers = || problem.fixtures.iter().map(|marker| &marker.points[..]);
+    let is_possible = |numbering: &Numbering| markers().any(|of| numbering.of(of, 0).is_some());
+    let numberings = Numbering::OTHERS.into_iter().filter(is_possible).map(Misreading::Renumbered);
+    let mut misreadings: Vec<Misreading> =
+        axes.into_iter().chain(numberings).chain(shifts).chain(from_one).collect();
     let of_kind = |wanted: FixtureKind| {
         let fixtures = problem.fixtures.iter().enumerate();
         fixtures.filter(move |(_, fixture)| fixture.kind == wanted)
@@ -55,13 +59,14 @@ impl Misreading {
                         pixel.y = height - pixel.y;
                     }
                 }
-                _ => {
+                Self::Renumbered(numbering) => {
                     let points = problem.fixtures.get(marker as usize).map(|of| &of.points[..]);
-                    let other = points.and_then(|points| transposed(points, point as usize));
+                    let other = points.and_then(|points| numbering.of(points, point as usize));
                     if let Some(other) = other.and_then(|other| u32::try_from(other).ok()) {
                         *observation = Observation::Pixel(camera, marker, other);
                     }
                 }
+                _ => {}
             }
         }
     }

@@ -331,7 +331,7 @@ impl Misreading {
                     *position = -(*turn * *position);
                 }
             }
-            Self::ExchangedAxes | Self::FromBottom | Self::Transposed | Self::FromOne => {
+            Self::ExchangedAxes | Self::FromBottom | Self::Renumbered(_) | Self::FromOne => {
                 self.undo_image(&mut rows, problem);
             }
             Self::ExchangedTargets { target, with } => {

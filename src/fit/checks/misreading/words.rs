@@ -7,6 +7,7 @@ use super::candidates::name_of_mass;
 use super::commands::MILLIRADIANS;
 use super::{MassScale, Misreading, POSITION_UNITS, numbers_of, power_of_ten};
 use crate::error::Location;
+use crate::fit::stages::single_views::Numbering;
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::fixture::carrier_word;
@@ -301,7 +302,12 @@ impl fmt::Display for Misreading {
             Self::FromBottom => f.write_str(
                 "a column v that counts from the bottom of the image (write height − v)",
             ),
-            Self::Transposed => f.write_str(
+            Self::Renumbered(Numbering::Exchanged([a, b])) => write!(
+                f,
+                "corners {a} and {b} of a tag that are exchanged (points_mm crosses it, detectors go \
+                 round)"
+            ),
+            Self::Renumbered(_) => f.write_str(
                 "points of the marker that are numbered along the other side (its rows and \
                  columns exchanged)",
             ),
