@@ -139,7 +139,9 @@ pub fn after_fit(
         None if !found.is_trusted() || report::determines_nothing(found) => {
             format!("flexcal check {named} says what the poses can tell")
         }
-        None if found.has(FindingCode::PriorsDecide) => {
+        None if found.has(FindingCode::PriorsDecide)
+            || found.has(FindingCode::HeldOutUncertain) =>
+        {
             format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
         }
         None if found.has(FindingCode::BoundInUnidentifiedDirection) => format!(

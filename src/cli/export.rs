@@ -17,7 +17,8 @@ use flexcal::remainder;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, ExportResult, ExportedErrors};
 use flexcal::urdf::{
-    Chain, MovedOrigin, Robot, YamlFormat, export_with_links, joint_origins, mounted_links, yaml,
+    Chain, MovedOrigin, Robot, YamlFormat, export_with_links, joint_origins, mounted_links,
+    mounted_target, yaml,
 };
 
 use super::estimate::Trust;
@@ -57,6 +58,10 @@ pub struct Arguments {
     /// Name of the camera that --format ros-camera or opencv writes, if there are several
     #[arg(long, value_name = "NAME", requires = "format")]
     camera: Option<String>,
+    /// Link of the URDF that gets the fitted pose of what was measured on the tool, such as a camera
+    /// whose poses another program gave
+    #[arg(long, value_name = "LINK", requires = "urdf")]
+    tool_link: Option<String>,
     /// Measurement files instead of those the problem names
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
@@ -127,6 +132,9 @@ impl Format {
     }
 }
 
+/// Coordinates of a pose in names of parameters.
+const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+
 /// Checks the options that choose the geometry of a file; `is_rigid` is true if the file holds one.
 fn check_geometry(arguments: &Arguments, is_rigid: bool) -> Result<(), code::ExportError> {
     let options =
@@ -196,7 +204,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let workspace = geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]);
     let mut remarks = report::ExportRemarks::new((workspace, problem.tool.payload_mass), alone);
     if matches!(arguments.format, Some(Format::Dh | Format::Mdh)) {
-        remarks.found = report::set_up_at(&model, x.as_slice());
+        remarks.found = report::set_up_at(&model, x.as_slice(), &estimates);
     }
     let Rendered { text, moved, name: default, elsewhere } =
         render(arguments, &problem, geometry.rigid().unwrap_or((&model, &x)), (arm, &mut remarks))?;
@@ -238,6 +246,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if camera.is_some() {
         result.not_held.clear();
     }
+    result.not_held.extend(pose_of_tool(arguments, &model));
     let stays = |link: String| format!("link {link}, which the URDF has on another link");
     result.not_held.extend(elsewhere.into_iter().map(stays));
     let kept = last_joint.filter(|_| geometry.best_rigid.is_some());
@@ -254,11 +263,25 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(alone) = alone.filter(is_strange) {
         diagnostic::warn(&format!("geometry alone: {}", report::why_not_trusted(alone)));
     }
+    for reservation in &estimates.reservations {
+        diagnostic::warn(&format!("not to be relied upon alone, the estimate says: {reservation}"));
+    }
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }
     // The trust in `alone` has no influence.
     Ok(Outcome::from_trust(estimates.trusted))
+}
+
+/// States how a URDF can hold the pose of what was measured on the tool, if all of it was fitted.
+fn pose_of_tool(arguments: &Arguments, model: &Model) -> Option<String> {
+    let names = model.parameters.iter().map(|parameter| parameter.name.as_str());
+    let has_pose = names.filter(|name| name.starts_with("tool.")).count() == AXES.len();
+    (has_pose && arguments.urdf.is_some() && arguments.tool_link.is_none()).then(|| {
+        "the pose of what was measured on the tool; if it is a camera, --tool-link LINK writes it \
+         to the camera's link"
+            .to_owned()
+    })
 }
 
 /// Text of the exported file, with facts for the printed summary.
@@ -290,20 +313,23 @@ fn check_poses(
         }
         Some(_) => false,
     };
+    let open_pose = |owner: &str, of: String, count: usize| {
+        let names: Vec<String> =
+            AXES.iter().take(count).map(|axis| format!("{owner}.{axis}")).collect();
+        let open = estimates.undetermined(&names);
+        let axes: Vec<&str> = open.iter().filter_map(|name| name.rsplit('.').next()).collect();
+        let coordinates = axes.join(", ");
+        let error = code::ExportError::PoseOpen { fixture: of, coordinates };
+        if axes.is_empty() { Ok(()) } else { Err(error) }
+    };
+    if arguments.tool_link.is_some() {
+        open_pose("tool", "the tool".to_owned(), AXES.len())?;
+    }
     for fixture in problem.fixtures.iter().filter(|fixture| is_written(fixture)) {
         let (kind, name) = (fixture.kind.word(), &fixture.name);
         // No view shows how a marker of one point is turned, nor of two about their line.
-        let count = if kind == "marker" && fixture.points.len() < 3 { 3 } else { 6 };
-        let axes = ["x", "y", "z", "rx", "ry", "rz"].into_iter().take(count);
-        let names: Vec<String> = axes.map(|axis| format!("{kind}[{name}].{axis}")).collect();
-        let open = estimates.undetermined(&names);
-        if !open.is_empty() {
-            let axes = open.iter().filter_map(|name| name.rsplit('.').next());
-            return Err(code::ExportError::PoseOpen {
-                fixture: format!("{kind} \"{name}\""),
-                coordinates: axes.collect::<Vec<_>>().join(", "),
-            });
-        }
+        let count = if kind == "marker" && fixture.points.len() < 3 { 3 } else { AXES.len() };
+        open_pose(&format!("{kind}[{name}]"), format!("{kind} \"{name}\""), count)?;
     }
     Ok(())
 }
@@ -319,7 +345,9 @@ fn render(
     if let Some(file) = &arguments.urdf {
         let robot = Robot::read(file)?;
         let chain = Chain::from_problem(&robot, problem)?;
-        let mounted = mounted_links(problem, model, x.as_slice());
+        let mut mounted = mounted_links(problem, model, x.as_slice());
+        let target = |link: &String| mounted_target(problem, model, x.as_slice(), link);
+        mounted.extend(arguments.tool_link.as_ref().map(target));
         let export = export_with_links(&chain, problem, arm, &mounted)?;
         let name = PathBuf::from(file.file_name().unwrap_or_default());
         let (text, elsewhere) = (export.text, export.elsewhere);

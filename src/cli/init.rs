@@ -9,7 +9,7 @@ use flexcal::error::{InputError, Location};
 use flexcal::problem::Problem;
 use flexcal::report;
 use flexcal::results::{Document as _, InitResult};
-use flexcal::urdf::{Chain, Robot, complete, describe_measured, in_tree_order, text_of_table};
+use flexcal::urdf::{Chain, Robot, TAG, complete, describe_measured, in_tree_order, text_of_table};
 
 use super::diagnostic;
 use super::flags::Flags;
@@ -23,6 +23,7 @@ use super::outcome::Outcome;
   flexcal init panda.urdf --tip panda_link8 --out panda
   flexcal init panda.urdf --tip panda_link8 --out panda --board 9x6x25
   flexcal init humanoid.urdf --tip head_camera --tip right_hand --board 9x6x25
+  flexcal init panda.urdf --tip panda_link8 --out panda --tag 50
   flexcal init sheet.csv --out my-arm
   flexcal identify panda --data measurements.csv"
 )]
@@ -43,8 +44,19 @@ pub struct Arguments {
     /// positions
     #[arg(long, value_name = "9x6x25", value_parser = parse_board)]
     board: Option<Board>,
+    /// Tag (AprilTag, ArUco) in place of a board: its size in mm, from corner to corner of the black
+    /// square
+    #[arg(long, value_name = "50", value_parser = parse_tag, conflicts_with = "board")]
+    tag: Option<Board>,
     #[command(flatten)]
     flags: Flags,
+}
+
+impl Arguments {
+    /// Returns the board or tag that a camera sees.
+    fn board(&self) -> Option<Board> {
+        self.board.or(self.tag)
+    }
 }
 
 /// Numbers of inner corners along and across a calibration board, and their distance \[mm\].
@@ -68,11 +80,19 @@ fn parse_board(text: &str) -> Result<Board, String> {
     Ok(([count(columns)?, count(rows)?], distance))
 }
 
+/// Parses the size of a tag in mm: a square without further corners.
+fn parse_tag(text: &str) -> Result<Board, String> {
+    let size = text.parse::<f64>().ok().filter(|mm| *mm > 0.0 && mm.is_finite());
+    Ok((TAG, size.ok_or("the size of the tag in mm has to be above 0, such as 50")?))
+}
+
 /// Completes the problem of an arm that was typed from a data sheet, as TOML or as a CSV table.
 fn complete_sheet(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let has_link = arguments.base.iter().chain(&arguments.tip).next().is_some();
-    if has_link || arguments.board.is_some() {
-        return Err("--base, --tip and --board belong to a URDF, not to a table of joints".into());
+    if has_link || arguments.board().is_some() {
+        return Err(
+            "--base, --tip, --board and --tag belong to a URDF, not to a table of joints".into()
+        );
     }
     let (problem, text) = if has_ending(&arguments.urdf, &["toml"]) {
         Problem::read_with_text(&arguments.urdf)?
@@ -110,9 +130,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if has_ending(&arguments.urdf, &["toml", "csv", "tsv", "txt"]) {
         return complete_sheet(arguments);
     }
-    if let Some((_, mm)) = arguments.board.filter(|board| !USUAL_SQUARES_MM.contains(&board.1)) {
+    if let Some((_, mm)) = arguments.board().filter(|board| !USUAL_SQUARES_MM.contains(&board.1)) {
         diagnostic::warn(&format!(
-            "--board: corners that are {mm} mm apart? The third number is in mm, such as 25 for \
+            "corners that are {mm} mm apart? --board 9x6x25 and --tag 50 are in mm, such as 25 for \
              squares of 0.025 m"
         ));
     }
@@ -120,14 +140,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut tips = arguments.tip.iter().map(|tip| Some(tip.as_str()));
     let to = |tip: Option<&str>| Chain::new(&robot, arguments.base.as_deref(), tip);
     let chain = to(tips.next().flatten())?;
-    let chain = if arguments.board.is_some() { chain.up_to_carrier_of_camera()? } else { chain };
+    let chain = if arguments.board().is_some() { chain.up_to_carrier_of_camera()? } else { chain };
     let further = in_tree_order(&chain, tips.map(to).collect::<Result<_, _>>()?)?;
-    if arguments.board.is_some() && further.len() > 1 {
+    if arguments.board().is_some() && further.len() > 1 {
         return Err(
             "--board takes one tip with the camera, and at most one that carries the board".into(),
         );
     }
-    let description = describe_measured(&chain, &further, arguments.board)?;
+    let description = describe_measured(&chain, &further, arguments.board())?;
     let flags = &arguments.flags;
     let results =
         flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
@@ -135,7 +155,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let file = results.path("problem.toml");
     let json = InitResult::new(&chain, &further, &description, &file).to_json();
     flags.print_result(&json, || {
-        let has_board = arguments.board.is_some();
+        let has_board = arguments.board().is_some();
         report::init_text(&chain, &further, &description, (&results.folder, has_board))
     })?;
     Ok(Outcome::Done)

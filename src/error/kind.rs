@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::NoRows;
 use super::near::{is_it_rather, key_suggestion, pattern_suggestion, suggestion};
 use super::phrases::{
-    behind_camera_remedy, decimal_comma_hint, joined_list, missed, near_quote, plural,
+    behind_camera_remedy, decimal_comma_hint, joined_list, missed, near_quote, plural, renumbered,
     stiffness_units, windows_path_hint, with_remedy,
 };
 use super::study::StudyErrorKind;
@@ -228,11 +228,10 @@ pub enum InputErrorKind {
     PointBehindCamera { fits: Option<bool>, miss: Option<f64>, few: usize, readings: Vec<String> },
     #[error(
         "the points of the images of camera \"{camera}\" fit no pose of marker \"{marker}\": \
-         {}, and by {transposed:.1} px with corners along and across exchanged; declare points_mm as \
-         the detector counts them, columns and rows exchanged",
-        missed(*declared)
+         {}, and by {:.1} px with {}",
+        missed(px[0]), px[1], renumbered(*crossed)
     )]
-    GridTransposed { camera: String, marker: String, declared: f64, transposed: f64 },
+    PointsRenumbered { camera: String, marker: String, px: [f64; 2], crossed: Option<[usize; 2]> },
     #[error(
         "the views do not determine the poses of camera \"{camera}\" and marker \"{marker}\": {why}; \
          add such views, or declare at_m and rotation_deg of one of them"

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::shortened;
+use super::table::ClockOffset;
 
 /// Returns the plural ending `s` unless `count` is 1.
 pub(super) fn plural(count: usize) -> &'static str {
@@ -144,6 +145,22 @@ pub(super) fn missed(miss: f64) -> String {
     }
 }
 
+/// Returns the other numbering of a marker's points with its remedy: two corners of a tag are
+/// exchanged, or else the grid is counted along its other side.
+pub(super) fn renumbered(crossed: Option<[usize; 2]>) -> String {
+    match crossed {
+        Some([a, b]) => format!(
+            "corners {a} and {b} exchanged: the order of points_mm crosses the tag, but detectors go \
+             round it; exchange points {a} and {b} of points_mm"
+        ),
+        None => {
+            "corners along and across exchanged; declare points_mm as the detector counts them, \
+                 columns and rows exchanged"
+                .to_owned()
+        }
+    }
+}
+
 /// Returns the remedy for a point behind the camera. `fits` is true if the points of the images fit
 /// the marker by themselves, which they miss by `miss` \[px\]. `few` is the largest number of points
 /// in an image if that is too small for a pose, otherwise 0.
@@ -198,17 +215,17 @@ pub(super) fn compared_keys(keys: Option<&[String; 2]>) -> String {
 /// Largest deviation \[h\] from a whole number of hours at which clocks are in two time zones.
 const MAX_OFF_HOUR: f64 = 2e-3;
 
-/// Returns the remedy for clocks that differ. `offset` is the value of `offset_s` \[s\] that pairs
-/// most rows, and the assignment of a larger tolerance if they need one; the text is empty for `None`.
-pub(super) fn clock_offset_remedy(offset: Option<&[String; 2]>) -> String {
-    offset.map_or_else(String::new, |[offset, tolerance]| {
-        let hours = offset.parse::<f64>().map_or(0.0, |seconds| seconds / 3600.0);
+/// Returns the remedy for clocks that differ; empty without an `offset` that pairs most rows.
+pub(super) fn clock_offset_remedy(offset: Option<ClockOffset>) -> String {
+    offset.map_or_else(String::new, |offset| {
+        let hours = offset.seconds / 3600.0;
         let is_zone =
             (0.5..=14.1).contains(&hours.abs()) && (hours - hours.round()).abs() < MAX_OFF_HOUR;
         let zone = if is_zone { " (by whole hours, as for summer time or UTC)" } else { "" };
         format!(
-            "; with the clock of the joint table moved by {offset} s the rows have partners: the \
-             clocks differ{zone}, so write offset_s = {offset}{tolerance} in joints"
+            "; with the clock of the joint table moved by {:?} s the rows have partners: the clocks \
+             differ{zone}, so write {offset} in joints",
+            offset.seconds
         )
     })
 }

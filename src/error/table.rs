@@ -1,5 +1,6 @@
 //! Errors in tables of measurements.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use thiserror::Error;
@@ -39,14 +40,14 @@ pub enum TableErrorKind {
         nearest_in_time_hint(gap.as_deref()),
         compared_keys(keys.as_ref()),
         if offset.is_some() {
-            clock_offset_remedy(offset.as_ref())
+            clock_offset_remedy(*offset)
         } else {
             "; check the column of the join (pose or time), whether both clocks agree, and \
              tolerance_s"
                 .to_owned()
         }
     )]
-    NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<[String; 2]> },
+    NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<ClockOffset> },
     #[error(
         "{left} of {rows} measured rows have no partner in the joint table, because tolerance_s is \
          too small: the nearest row is typically {gap} away, and rows of the joint table are \
@@ -64,7 +65,7 @@ pub enum TableErrorKind {
         nearest_in_time_hint(gap.as_deref()),
         compared_keys(keys.as_deref()),
         if offset.is_some() {
-            clock_offset_remedy(offset.as_deref())
+            clock_offset_remedy(*offset)
         } else {
             ", and no other offset of the clocks certainly pairs them; check whether both clocks \
              agree, offset_s and tolerance_s, and leave out rows that the joint table does not log"
@@ -76,27 +77,27 @@ pub enum TableErrorKind {
         rows: usize,
         gap: Option<String>,
         keys: Option<Box<[String; 2]>>,
-        offset: Option<Box<[String; 2]>>,
+        offset: Option<ClockOffset>,
     },
     #[error(
         "{same} of {rows} measured rows have the same partner, {partner}, an end of the joint \
          table; check whether both clocks agree, and tolerance_s{}{}",
         compared_keys(keys.as_deref()),
-        clock_offset_remedy(offset.as_deref())
+        clock_offset_remedy(*offset)
     )]
     CommonPartner {
         same: usize,
         rows: usize,
         partner: String,
         keys: Option<Box<[String; 2]>>,
-        offset: Option<Box<[String; 2]>>,
+        offset: Option<ClockOffset>,
     },
     #[error(
         "the rows of both tables are typically {gap} apart, less than tolerance_s allows, and \
          may belong to different poses{}",
-        clock_offset_remedy(Some(offset))
+        clock_offset_remedy(Some(*offset))
     )]
-    ClocksDiffer { gap: String, offset: [String; 2] },
+    ClocksDiffer { gap: String, offset: ClockOffset },
     #[error(
         "the joint table has {logged} rows for {rows} measured rows, and by = \"order\" pairs the \
          first with the first, so that all pairs behind a row without a partner are wrong; write \
@@ -426,16 +427,34 @@ pub enum TableErrorKind {
 }
 
 impl TableErrorKind {
-    /// Returns the offset of the clocks with which the rows of two tables have partners, with the
-    /// assignment of a larger tolerance that it needs, if the error states one.
-    pub(crate) fn clock_offset(&self) -> Option<&[String; 2]> {
+    /// Returns the offset of the clocks with which the rows of two tables have partners, if the error
+    /// states one.
+    pub(crate) fn clock_offset(&self) -> Option<ClockOffset> {
         match self {
-            Self::NothingJoined { offset, .. } => offset.as_ref(),
-            Self::MostUnpaired { offset, .. } | Self::CommonPartner { offset, .. } => {
-                offset.as_deref()
-            }
-            Self::ClocksDiffer { offset, .. } => Some(offset),
+            Self::NothingJoined { offset, .. }
+            | Self::MostUnpaired { offset, .. }
+            | Self::CommonPartner { offset, .. } => *offset,
+            Self::ClocksDiffer { offset, .. } => Some(*offset),
             _ => None,
         }
+    }
+}
+
+/// Offset of the clock of a joint table with which its rows pair with those of the measurements.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockOffset {
+    /// Value of `offset_s` \[s\].
+    pub seconds: f64,
+    /// Larger value of `tolerance_s` that the rows need \[s\]; `None` if the present one is enough.
+    pub tolerance: Option<f64>,
+    /// True if so many rows pair so closely that no other pairs are likely.
+    pub is_clear: bool,
+}
+
+impl fmt::Display for ClockOffset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "offset_s = {:?}", self.seconds)?;
+        self.tolerance.map_or(Ok(()), |tolerance| write!(f, " and tolerance_s = {tolerance}"))
     }
 }

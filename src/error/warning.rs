@@ -134,10 +134,10 @@ pub enum WarningKind {
     )]
     DateOrderAssumed { value: String, read: String, is_day_first: bool },
     #[error(
-        "its clock differs from that of the measurements: rows are paired with offset_s = \
-         {offset}{tolerance}, with which they agree; check that both tables are of one measurement"
+        "its clock differs from that of the measurements: rows are paired with {offset}, \
+         with which they agree; check that both tables are of one measurement"
     )]
-    ClockOffsetFound { offset: String, tolerance: String },
+    ClockOffsetFound { offset: String },
     #[error(
         "equal to {first} in all digits{}; measurements do not repeat so exactly, and a copied \
          row counts twice: leave the copies out",

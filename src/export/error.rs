@@ -12,7 +12,8 @@ pub enum ExportError {
     #[error(
         "the measurements do not determine {coordinates} of {fixture}, so that its pose in \
          the file would be arbitrary; declare the place of the camera or of the marker (at_m, \
-         rotation_deg), or add views with the camera turned about two axes"
+         rotation_deg) or hold the coordinates of the tool, or add views with the hand turned about \
+         two axes"
     )]
     PoseOpen {
         /// Kind and name of the camera or marker.

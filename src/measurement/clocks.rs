@@ -124,6 +124,26 @@ pub(super) struct ClockShift {
     pub gap: f64,
 }
 
+/// Largest time between rows that an undeclared offset of the clocks pairs, as a fraction of the time
+/// between two rows of the joint table: rows of other poses are seldom so near.
+const MAX_CLEAR_GAP: f64 = 0.25;
+/// Smallest number of measured rows with which such an offset is taken.
+const MIN_CLEAR_ROWS: usize = 10;
+
+impl ClockShift {
+    /// Returns true if so many rows measured at `times` \[s\] are so near their partners in `log` that
+    /// the shift may be taken without being declared.
+    pub fn is_clear(self, times: &[f64], log: &[f64]) -> bool {
+        let is_close = median_step(log).is_some_and(|step| self.gap <= MAX_CLEAR_GAP * step);
+        is_close && times.len() >= MIN_CLEAR_ROWS
+    }
+}
+
+/// Returns the median time between two rows of a joint table \[s\].
+pub(super) fn median_step(log: &[f64]) -> Option<f64> {
+    median(log.iter().zip(log.iter().skip(1)).map(|(a, b)| b - a).collect())
+}
+
 /// Returns the shift of the times of a joint table with which its rows pair best with the rows
 /// measured at `times` \[s\].
 ///
@@ -228,7 +248,7 @@ pub(super) fn clock_jump(
     (times, log): (&[f64], &[f64]),
     first: Option<&Location>,
 ) -> Option<Warning> {
-    let JoinRule::Time { tolerance, .. } = rule else { return None };
+    let (tolerance, _) = rule.times()?;
     let is_unpaired = |time: &&f64| nearest(log, **time).is_some_and(|(_, gap)| gap > tolerance);
     let times: Vec<f64> = times.iter().filter(is_unpaired).copied().collect();
     let shift = zone_change(&times, log)?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::appended::{JointRow, JointTableFormat};
 use super::clocks::{
-    ClockShift, Rest, best_shift, clock_jump, moving_arm, nearest, rests, rounded_up,
+    ClockShift, Rest, best_shift, clock_jump, median_step, moving_arm, nearest, rests, rounded_up,
     shifts_by_rows,
 };
 use super::headerless::{holds_numbers, no_header};
@@ -17,7 +17,7 @@ use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
 use super::spelling::{misplaced, quoted, same_but_for_spelling, usual_difference};
 use super::table::{Table, shortened};
 use super::time::shown;
-use crate::error::{InputError, Location, TableErrorKind, Warning, WarningKind};
+use crate::error::{ClockOffset, InputError, Location, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Dialect, JoinRule, JointLog, Problem};
 use crate::quantity::format::two_digits;
 
@@ -130,7 +130,8 @@ impl JoinedLog {
         while table.next_row()? {
             let mut time = f64::NAN;
             match (self.rule, key) {
-                (JoinRule::Time { offset, .. }, Some(key)) => {
+                (JoinRule::Time { .. }, Some(key)) => {
+                    let (_, offset) = self.rule.times().unwrap_or_default();
                     time = table.time(key.place, key.to_si)? + offset;
                 }
                 (JoinRule::Name, Some(key)) => {
@@ -229,7 +230,8 @@ impl JoinedLog {
                 }
                 partner
             }
-            (JoinRule::Time { tolerance, .. }, Some(key)) => {
+            (JoinRule::Time { .. }, Some(key)) => {
+                let (tolerance, _) = self.rule.times().unwrap_or_default();
                 let time = table.time(key.place, key.to_si)?;
                 self.times.push(time);
                 nearest(&self.log_times, time)
@@ -268,7 +270,7 @@ impl JoinedLog {
     /// \[s\]. If `is_unpaired` is true, the measured rows are those without a partner, else those
     /// with one. Empty unless the tables are joined by time.
     fn gaps(&self, is_unpaired: bool) -> Vec<f64> {
-        let JoinRule::Time { tolerance, .. } = self.rule else { return Vec::new() };
+        let Some((tolerance, _)) = self.rule.times() else { return Vec::new() };
         let gap = |time: &f64| nearest(&self.log_times, *time).map(|(_, gap)| gap);
         let mut gaps: Vec<f64> = self.times.iter().filter_map(gap).collect();
         gaps.retain(|gap| (*gap > tolerance) == is_unpaired);
@@ -286,7 +288,7 @@ impl JoinedLog {
     /// Returns the tolerance with which all measured rows have a partner, if it is at most twice that
     /// of the problem.
     fn sufficient_tolerance(&self) -> Option<String> {
-        let JoinRule::Time { tolerance, .. } = self.rule else { return None };
+        let (tolerance, _) = self.rule.times()?;
         let most = self.gaps(true).last().copied()?;
         (most <= 2.0 * tolerance).then(|| rounded_up(most))
     }
@@ -297,10 +299,7 @@ impl JoinedLog {
     fn small_tolerance(&self) -> Option<TableErrorKind> {
         let gaps = self.gaps(true);
         let (usual, most) = (*gaps.get(gaps.len() / 2)?, *gaps.get(gaps.len() * 9 / 10)?);
-        let mut steps: Vec<f64> =
-            self.log_times.iter().zip(self.log_times.iter().skip(1)).map(|(a, b)| b - a).collect();
-        steps.sort_by(f64::total_cmp);
-        let step = *steps.get(steps.len() / 2)?;
+        let step = median_step(&self.log_times)?;
         (gaps.len() >= MIN_CHECKED_ROWS && 10.0 * most < step).then(|| {
             TableErrorKind::ToleranceTooSmall {
                 left: self.unpaired.len(),
@@ -312,25 +311,24 @@ impl JoinedLog {
         })
     }
 
-    /// Returns the shift of the log with which the rows of both tables pair best, with the value of
-    /// `offset_s` that gives it, and the assignment of a larger tolerance if it needs one; `None` if
-    /// the tables are not joined by time or no shift is certain.
-    fn shift(&self) -> Option<(ClockShift, [String; 2])> {
-        let JoinRule::Time { offset, tolerance } = self.rule else { return None };
+    /// Returns the shift of the log with which the rows of both tables pair best, with the offset of
+    /// the clocks that gives it; `None` if the tables are not joined by time or no shift is certain.
+    fn shift(&self) -> Option<(ClockShift, ClockOffset)> {
+        let (tolerance, offset) = self.rule.times()?;
         let shift = best_shift(&self.times, (&self.log_times, &self.rests))?;
-        let seconds = ((offset + shift.seconds) * 1e3).round() / 1e3;
-        let more = if shift.gap > tolerance {
-            format!(" and tolerance_s = {}", rounded_up(shift.gap))
-        } else {
-            String::new()
+        let needs_more = shift.gap > tolerance;
+        let found = ClockOffset {
+            seconds: ((offset + shift.seconds) * 1e3).round() / 1e3,
+            tolerance: needs_more.then(|| rounded_up(shift.gap).parse().ok()).flatten(),
+            is_clear: shift.is_clear(&self.times, &self.log_times),
         };
-        Some((shift, [format!("{seconds:?}"), more]))
+        Some((shift, found))
     }
 
     /// Returns for each number of rows, by which positions may come after their configurations, the
     /// value of `offset_s` that pairs them so \[s\].
     pub fn offsets_by_rows(&self) -> Vec<(i8, f64)> {
-        let JoinRule::Time { offset, tolerance } = self.rule else { return Vec::new() };
+        let Some((tolerance, offset)) = self.rule.times() else { return Vec::new() };
         let shifts = shifts_by_rows(&self.times, &self.log_times, tolerance);
         shifts.into_iter().map(|(by, shift)| (by, offset + shift)).collect()
     }
@@ -360,7 +358,7 @@ impl JoinedLog {
         let error = |kind: TableErrorKind| Err(self.location.clone().error(kind));
         let (left, rows, logged) = (self.unpaired.len(), self.requested, self.rows.len());
         let shift = self.shift();
-        let offset = || shift.clone().map(|(_, offset)| offset);
+        let offset = shift.map(|(_, offset)| offset);
         // An instrument may also measure between poses.
         let used = self.rows.iter().filter(|row| row.uses > 0).count();
         let are_most_left = 2 * left > rows && 2 * used < logged;
@@ -381,7 +379,7 @@ impl JoinedLog {
             return error(error_kind);
         }
         if self.paired == 0 && self.requested > 0 {
-            let (gap, keys, offset) = (self.gap(), self.keys(), offset());
+            let (gap, keys) = (self.gap(), self.keys());
             return error(TableErrorKind::NothingJoined { gap, keys, offset });
         }
         if self.rule == JoinRule::Order && logged != rows {
@@ -397,7 +395,7 @@ impl JoinedLog {
             return Ok(());
         }
         if are_most_left {
-            let (keys, offset) = (self.keys().map(Box::new), offset().map(Box::new));
+            let keys = self.keys().map(Box::new);
             let gap = self.gap();
             return error(TableErrorKind::MostUnpaired { left, rows, gap, keys, offset });
         }
@@ -408,7 +406,7 @@ impl JoinedLog {
         }
         if let Some(row) = self.common_partner() {
             let partner = Location::file(&row.source.file).at_line(row.source.line).to_string();
-            let (keys, offset) = (self.keys().map(Box::new), offset().map(Box::new));
+            let keys = self.keys().map(Box::new);
             let same = row.uses;
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
         }
@@ -424,7 +422,7 @@ impl JoinedLog {
     /// Returns the name of the table whose times are whole minutes while those of the other are
     /// not. `None` if there is no such table, or if the tables are not joined by time.
     fn table_without_seconds(&self) -> Option<&'static str> {
-        let JoinRule::Time { offset, .. } = self.rule else { return None };
+        let (_, offset) = self.rule.times()?;
         if self.times.len().min(self.log_times.len()) < MIN_CHECKED_ROWS {
             return None;
         }
@@ -493,7 +491,8 @@ impl JoinedLog {
         let others = unpaired.into_iter().flatten();
         let others = others.chain(jump.or_else(|| order_contradicted(&self.timed_pairs)));
         let moving = (&*self.times, &*self.rests);
-        let shift = || self.shift().map(|(shift, [offset, _])| (shift.seconds, offset));
+        let shift =
+            || self.shift().map(|(shift, offset)| (shift.seconds, format!("{:?}", offset.seconds)));
         let others = others.chain(moving_arm(moving, shift, &self.location));
         Ok(self.text_warnings.iter().cloned().chain(others).collect())
     }

@@ -6,6 +6,9 @@ use super::table::Table;
 use crate::error::{InputError, JOINED, TableErrorKind};
 use crate::problem::{ColumnRule, ColumnSelector, Dialect};
 
+/// Flexcal's names of a clock.
+const CLOCKS: [&str; 3] = ["time", "time_s", "time_ms"];
+
 /// Names of a table's columns, as in the table and in flexcal's vocabulary.
 pub(super) struct Names<'a> {
     /// Name of each column in flexcal's vocabulary with the rule that assigns it; the name in the
@@ -46,11 +49,13 @@ impl<'a> Names<'a> {
             ColumnSelector::Place(_) => !has(&rule.ours),
             ColumnSelector::File => rules.len() == 1,
         };
-        // A table whose joints and positions have flexcal's names needs no other column of the map, and
-        // its clock has flexcal's name too.
-        let mut of_arm = rules.iter().filter(|rule| is_joint(rule) || is_position(rule)).peekable();
-        let is_ours =
-            of_arm.peek().is_some() && of_arm.all(|rule| has(&rule.ours) && !is_foreign(&rule));
+        // A table whose joints, positions and clock have flexcal's names, such as a measured plan, does
+        // not have the clock of foreign tables, though one of the names may be the same.
+        let is_of_arm = |rule: &&ColumnRule| is_joint(rule) || is_position(rule);
+        let mut of_arm = rules.iter().filter(is_of_arm);
+        let is_ours = table.header.iter().any(|name| CLOCKS.contains(&name.as_str()))
+            && rules.iter().any(|rule| is_of_arm(&rule))
+            && of_arm.all(|rule| has(&rule.ours) && !is_foreign(&rule));
         if !rules.iter().any(|rule| is_foreign(&rule)) {
             // The clocks of a joint table may need other rules.
             let is_of_clock =
@@ -81,7 +86,7 @@ impl<'a> Names<'a> {
             let Some(entry) = place.and_then(|place| of_place.get_mut(place)) else {
                 // The join has used the clock of the joint table, which stands in no row.
                 let is_clock = table.appended_columns().is_some() && is_clock(&rule.ours);
-                if !measured || is_ours || has(&rule.ours) || is_given_otherwise(rule) || is_clock {
+                if !measured || has(&rule.ours) || is_given_otherwise(rule) || is_clock {
                     continue;
                 }
                 return Err(no_such(rule, rules, table));

@@ -95,8 +95,13 @@ impl Measurements {
         table_use: Use,
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let as_declared = Self::read_files(files, problem, table_use);
-        let is_open =
-            |log: &&JointLog| log.is_given || log.by.has_no_offset() && files == problem.data.files;
+        let are_same = || {
+            let declared = &problem.data.files;
+            let mut pairs = files.iter().zip(declared);
+            files.len() == declared.len()
+                && pairs.all(|(file, other)| file == other || same_file(file, other))
+        };
+        let is_open = |log: &&JointLog| log.is_given || log.by.has_no_offset() && are_same();
         let open = problem.data.joint_log.as_ref().filter(is_open);
         let found = as_declared.as_ref().err().and_then(|error| match &*error.kind {
             InputErrorKind::Table(kind) => kind.clock_offset(),
@@ -107,8 +112,7 @@ impl Measurements {
         let mut moved = problem.clone();
         moved.data.joint_log = Some(JointLog { by, ..log.clone() });
         let location = Location::file(log.files.first().map_or(Path::new(""), PathBuf::as_path));
-        let [offset, tolerance] = found.clone();
-        let kind = WarningKind::ClockOffsetFound { offset, tolerance };
+        let kind = WarningKind::ClockOffsetFound { offset: found.to_string() };
         let (rows, warnings) = Self::read_files(files, &moved, table_use)?;
         let found = Warning { location, kind };
         Ok((rows, std::iter::once(found).chain(warnings).collect()))

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::item::Item;
 use super::joint_source::JointSource;
 use super::path::without_detours;
-use crate::error::{InputError, InputErrorKind, Location};
+use crate::error::{ClockOffset, InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
 /// Table of joint coordinates that is joined to the table of measured positions.
@@ -43,10 +43,10 @@ pub enum JoinRule {
     Order,
     /// Pairs each row with the one nearest in time, at most `tolerance` apart \[s\].
     Time {
-        /// Maximum time between two paired rows \[s\].
-        tolerance: f64,
-        /// Time that is added to the clock of the joint table \[s\].
-        offset: f64,
+        /// Maximum time between two paired rows \[s\], if it is declared.
+        tolerance: Option<f64>,
+        /// Time that is added to the clock of the joint table \[s\], if it is declared.
+        offset: Option<f64>,
     },
 }
 
@@ -55,18 +55,26 @@ pub enum JoinRule {
 const MAX_FOUND_OFFSET: f64 = 86_400.0;
 
 impl JoinRule {
-    /// Returns true if rows are joined by time and no offset of the clocks is declared.
-    pub(crate) fn has_no_offset(self) -> bool {
-        matches!(self, Self::Time { offset, .. } if offset == 0.0)
+    /// Returns the maximum time between paired rows, and the time that is added to the clock of the
+    /// joint table \[s\]; `None` for rows that are not joined by time.
+    pub(crate) fn times(self) -> Option<(f64, f64)> {
+        let Self::Time { tolerance, offset } = self else { return None };
+        Some((tolerance.unwrap_or(DEFAULT_TIME_TOLERANCE), offset.unwrap_or(0.0)))
     }
 
-    /// Returns the rule with the offset of the clocks that an error states, and with its assignment of
-    /// a larger tolerance unless that is empty; `None` for rows that are not joined by time.
-    pub(crate) fn moved_to(self, [offset, tolerance]: &[String; 2]) -> Option<Self> {
+    /// Returns true if rows are joined by time and no offset of the clocks is declared.
+    pub(crate) fn has_no_offset(self) -> bool {
+        matches!(self, Self::Time { offset: None, .. })
+    }
+
+    /// Returns the rule with the offset of the clocks that was found; `None` for rows that are not
+    /// joined by time, and for an offset that may not be taken without being declared.
+    pub(crate) fn moved_to(self, found: ClockOffset) -> Option<Self> {
         let Self::Time { tolerance: declared, .. } = self else { return None };
-        let stated = tolerance.rsplit(' ').next().and_then(|number| number.parse().ok());
-        let offset = offset.parse().ok().filter(|offset: &f64| offset.abs() < MAX_FOUND_OFFSET)?;
-        Some(Self::Time { offset, tolerance: stated.unwrap_or(declared) })
+        let is_kept = declared.is_none() || found.tolerance.is_none();
+        let may_be_taken = found.is_clear && found.seconds.abs() < MAX_FOUND_OFFSET && is_kept;
+        let tolerance = found.tolerance.or(declared);
+        may_be_taken.then_some(Self::Time { tolerance, offset: Some(found.seconds) })
     }
 }
 
@@ -94,10 +102,8 @@ pub(super) fn read(
         "name" => JoinRule::Name,
         "order" => JoinRule::Order,
         _ => JoinRule::Time {
-            tolerance: section
-                .positive("tolerance", Unit::Time, not_positive)?
-                .unwrap_or(DEFAULT_TIME_TOLERANCE),
-            offset: section.number("offset", Unit::Time)?.unwrap_or(0.0),
+            tolerance: section.positive("tolerance", Unit::Time, not_positive)?,
+            offset: section.number("offset", Unit::Time)?,
         },
     };
     let source = section.word("source", &JointSource::WORDS, &JointSource::EACH)?;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Table};
 use super::render::text;
-use crate::fit::{ErrorSummary, Estimate, Identification, rows_of_kind};
+use crate::fit::{ErrorSummary, Estimate, Identification, SavedEstimate, rows_of_kind};
 use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::quantity::format::{counted, mm, number};
@@ -77,12 +77,16 @@ pub fn kept_at_end(joint: &str) -> String {
     )
 }
 
-/// Returns the values of base and tool at the deviations `x` of all parameters, one text for each.
-pub fn set_up_at(model: &Model, x: &[f64]) -> Vec<String> {
+/// Returns the values of base and tool at the deviations `x` of all parameters, one text for each;
+/// those that the rows leave open in `estimates` have none.
+pub fn set_up_at(model: &Model, x: &[f64], estimates: &SavedEstimate) -> Vec<String> {
     let is_set_up = |parameter: &Parameter| {
         matches!(parameter.site, ParameterSite::Base { .. } | ParameterSite::Target { .. })
     };
     let line = |(parameter, x): (&Parameter, &f64)| {
+        if !estimates.undetermined(std::slice::from_ref(&parameter.name)).is_empty() {
+            return format!("{} = open: the rows do not determine it", parameter.name);
+        }
         let unit = parameter.unit().display(parameter.nominal);
         let value = number(parameter.value(*x) * unit.factor, 4);
         format!("{} = {value} {}", parameter.name, unit.symbol)

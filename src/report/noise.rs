@@ -8,7 +8,7 @@ use super::errors::{brief, row_noun, test_rows_word, unit, with_unit};
 use super::prior::contradiction;
 use super::remainder::{HELD_OUT, PredictionAccuracy, exceed};
 use crate::fit::{FindingCode, Identification, Noise, Outlier, TypicalScatter, size_of_kind};
-use crate::problem::{Observation, Problem};
+use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, mm, number};
 use crate::results::{ResidualSize, rows_in};
 
@@ -19,9 +19,6 @@ const MAX_SHOWN_INFLUENTIAL: usize = 3;
 /// Largest ratio of the noise variance that a fit with a prior assumes to the declared one, at which
 /// they are equal but for rounding.
 const MAX_EQUAL_VARIANCE_RATIO: f64 = 1.0 + 1e-9;
-/// Smallest ratio of the rms error of held-out rows to that of fitted rows which is said where no
-/// error bound says it.
-const UNCERTAIN_RATIO: f64 = 3.0;
 /// Largest χ²/ν that noise alone gives in 99.9 % of cases, up to which a χ²/ν within the interval
 /// shows that the model explains the data.
 const MAX_TELLING_CHANCE: f64 = 1.8;
@@ -347,9 +344,11 @@ pub(super) fn reservations(
         "held-out rows are farther from the prediction than the fit expects, beyond chance"
             .to_owned()
     });
-    let uncertain = uncertainty(found).filter(|_| {
-        accuracy.and_then(|accuracy| accuracy.bound.as_ref()).is_none() && farther.is_none()
-    });
+    let uncertain = found
+        .finding(FindingCode::HeldOutUncertain)
+        .filter(|_| accuracy.and_then(|accuracy| accuracy.bound.as_ref()).is_none())
+        .map(|finding| format!("{}, so more poses are needed", finding.text));
+    let set_up = found.finding(FindingCode::SetUpUndecided).map(|finding| finding.text.clone());
     let outliers = found.finding(FindingCode::HeldOutOutliers).and_then(|finding| {
         let (rows, of) = (finding.count("rows")?, finding.count("of")?);
         let of = counted(of, &format!("held-out {}", row_noun(found)));
@@ -359,26 +358,10 @@ pub(super) fn reservations(
     let changed = found
         .has(FindingCode::RowsChanged)
         .then(|| "something changed between the rows (see the warnings)".to_owned());
-    [worse, prior, exceeding.or(farther).or(outliers).or(uncertain), changed]
+    [worse, prior, exceeding.or(farther).or(outliers).or(uncertain), changed, set_up]
         .into_iter()
         .flatten()
         .collect()
-}
-
-/// States that held-out rows miss by far more than fitted ones although the covariance of the
-/// parameters allows it; `None` if they do not.
-fn uncertainty(found: &Identification) -> Option<String> {
-    let [fitted, held_out] = [&found.fitted.identification, &found.fitted.held_out];
-    let ratio = held_out.rms.norm / fitted.rms.norm;
-    let is_of_images = fitted.kind == Observation::Pixel(0, 0, 0).kind();
-    let exceeds_noise = held_out.rms.norm > UNCERTAIN_RATIO * found.sigma_taken;
-    (is_of_images && exceeds_noise && ratio.is_finite() && ratio > UNCERTAIN_RATIO).then(|| {
-        format!(
-            "held-out {}s miss by {ratio:.0} times as much as fitted ones, so more poses are \
-             needed",
-            row_noun(found)
-        )
-    })
 }
 
 /// States whether the fit is to be trusted, with what contradicts it, the held-out error before and

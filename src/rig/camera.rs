@@ -145,8 +145,8 @@ impl Rig {
                 (Effect::LensSag { camera, joint }, [x_sin, x_cos, y_sin, y_cos])
                     if is_of(camera) =>
                 {
-                    let angle = conditions.configuration.get(joint - 1).copied().unwrap_or(0.0);
-                    let (sin, cos) = angle.sin_cos();
+                    let angle = conditions.configuration.get(joint.wrapping_sub(1)).copied();
+                    let (sin, cos) = angle.unwrap_or(0.0).sin_cos();
                     add(CENTRE_X, x_sin * sin + x_cos * cos);
                     add(CENTRE_X + 1, y_sin * sin + y_cos * cos);
                 }

@@ -59,8 +59,11 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     describe_measured(chain, &[], None)
 }
 
+/// Numbers of corners that stand for a tag, which has its own four.
+pub const TAG: [usize; 2] = [1, 1];
+
 /// Converts a chain like [`describe`], with the chains to further tips of the same robot as branches
-/// of one tree. A `board` (numbers of corners along and across, their distance \[mm\]) makes a
+/// of one tree. A `board` (numbers of corners along and across, or [`TAG`], and their distance \[mm\]) makes a
 /// problem of a camera at the tip that sees it, in the world or at the second tip; otherwise
 /// positions are measured.
 ///
@@ -355,7 +358,8 @@ fn targets(tips: &[(&str, usize)]) -> String {
 }
 
 /// Returns the sections of a camera on the tip and a board in the world, or on the second of several
-/// `tips`. The board has `columns` × `rows` corners at a `distance` \[mm\], in the order of OpenCV.
+/// `tips`. The board has `columns` × `rows` corners at a `distance` \[mm\], in the order of OpenCV; a
+/// tag has four, in the order of its detector.
 fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String], name: Option<&str>) -> String {
     let on = |tip: usize| tips.get(tip).filter(|_| tips.len() > 1).map(|name| quoted(name));
     let (camera, board) =
@@ -365,7 +369,13 @@ fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String], name: Optio
         let place = |count: usize| number(count as f64 * distance);
         format!("[{}, {}, 0]", place(k % columns), place(k / columns))
     };
-    let corners: Vec<String> = (0..columns * rows).map(corner).collect();
+    let half = number(distance / 2.0);
+    let (word, corners) = if [columns, rows] == TAG {
+        let round = [("-", ""), ("", ""), ("", "-"), ("-", "-")];
+        ("tag", round.map(|(x, y)| format!("[{x}{half}, {y}{half}, 0]")).to_vec())
+    } else {
+        ("board", (0..columns * rows).map(corner).collect::<Vec<_>>())
+    };
     format!(
         "\n[[camera]]\nname = {}\non = {camera}                                     # the frame that carries it; \"world\" if it stands apart\n\
          focal_px = [900, 900]                            # fill in, roughly: it is fitted\n\
@@ -373,7 +383,7 @@ fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String], name: Optio
          image_px = [1280, 720]                           # fill in: width and height\n\
          distortion = [0, 0, 0, 0, 0]                     # k1, k2, p1, p2, k3\n\
          pixel_sigma = 0.3                                # fill in: 1 σ of u and v of a found corner\n\n\
-         [[marker]]\nname = \"board\"\non = {board}                                     # or a frame of the arm, \"tool\" for one\n\
+         [[marker]]\nname = \"{word}\"\non = {board}                                     # or a frame of the arm, \"tool\" for one\n\
          points_mm = [{}]\n",
         quoted(name.unwrap_or("camera")),
         corners.join(", ")

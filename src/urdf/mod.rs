@@ -38,9 +38,9 @@ pub(crate) use sheet_table::text_of_table;
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
-    describe::{HELD_OUT, describe_measured},
+    describe::{HELD_OUT, TAG, describe_measured},
     export::export_with_links,
-    mounted::{MountedLink, mounted_links},
+    mounted::{MountedLink, mounted_links, mounted_target},
     yaml::{YamlFormat, joint_origins, yaml},
 };
 pub(crate) use yaml::key as yaml_key;

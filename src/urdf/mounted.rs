@@ -36,6 +36,15 @@ pub fn mounted_links(problem: &Problem, model: &Model, x: &[f64]) -> Vec<Mounted
         .collect()
 }
 
+/// Returns the target that was measured, such as a camera whose poses another program gave, as a link
+/// of a URDF. Its pose follows from the full parameter vector `x` of the model.
+pub fn mounted_target(problem: &Problem, model: &Model, x: &[f64], link: &str) -> MountedLink {
+    let position = model.target_positions(x).first().copied().unwrap_or(problem.tool.target);
+    let turn = model.target_rotations(x).first().copied().unwrap_or(problem.tool.rotation);
+    let pose = Frame::from_rotation_vector(position, &turn);
+    MountedLink { link: link.to_owned(), carrier: model.target_joint(0) + 1, pose }
+}
+
 /// Adds a link with a fixed joint for each of the `mounted`. If the file has the link on the same
 /// parent, or behind further fixed joints, the origin of its joint is changed instead. Returns the names of the links that the file
 /// has elsewhere, which stay as they are. The first of the branches ends at the tip.

@@ -124,3 +124,124 @@ fn pixels_outside_the_declared_image_are_warned_of() {
         &["column v_px", "is outside the image of the camera \"hand\", image_px = [1280, 480]"],
     );
 }
+
+/// Arm of three joints with a camera on its hand.
+const ARM: &str = r#"<robot name="hand">
+<link name="base"/><link name="a"/><link name="b"/><link name="c"/><link name="camera_optical_frame"/>
+<joint name="j1" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+<origin xyz="0 0 0.3" rpy="0 0 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<joint name="j2" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+<origin xyz="0 0 0.1" rpy="0 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="j3" type="revolute"><parent link="b"/><child link="c"/><axis xyz="1 0 0"/>
+<origin xyz="0.3 0 0" rpy="0 0 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<joint name="mount" type="fixed"><parent link="c"/><child link="camera_optical_frame"/>
+<origin xyz="0 0 0" rpy="0 0 0"/></joint>
+</robot>"#;
+
+#[test]
+fn the_link_of_a_camera_takes_the_pose_that_other_poses_give() {
+    let truth = |second: &str| {
+        format!(
+            "[parameters]\n\"tool.x\" = {{ mm = 50 }}\n\"tool.y\" = {{ mm = -20 }}\n\
+             \"tool.z\" = {{ mm = 30 }}\n\"tool.rx\" = {{ deg = 0 }}\n\
+             \"tool.ry\" = {{ deg = 0 }}\n\"tool.rz\" = {{ deg = 30 }}\n[noise]\n\
+             position_sigma_mm = 0.1\n[poses]\nj1_deg = [-60, 60]\n{second}"
+        )
+    };
+    let folder = Folder::with([
+        ("arm.urdf", ARM),
+        ("all.toml", &truth("")),
+        ("one.toml", &truth("j2_deg = [10, 10.01]\nj3_deg = [5, 5.01]\n")),
+    ]);
+    folder.flexcal("init arm.urdf --tip c --out p").success();
+    folder.map("p/problem.toml", |text| {
+        text.replace("position_sigma_mm =", "orientation_sigma_deg = 0.02\nposition_sigma_mm =")
+            .replace("\"tool.*\" = { sigma_mm = 100.0 }", "\"tool.*\" = { free = true }")
+            .replace(
+                "\"joint*.*\" = { sigma_deg = 0.5, sigma_mm = 2.0 }",
+                "\"joint*.*\" = { fixed = true }",
+            )
+    });
+    folder.simulate("p", "all.toml", 40, 1, "p/measurements.csv");
+    folder.flexcal("identify p --out fit --quiet").success();
+    let export = "export p --estimate fit/estimate.json --urdf arm.urdf --out new.urdf";
+    assert_contains(&folder.flexcal(export).success().words(), &["--tool-link LINK writes it"]);
+    folder.flexcal(&format!("{export} --force --tool-link camera_optical_frame")).success();
+    let text = folder.read("new.urdf");
+    let (_, mount) = text.split_once("<joint name=\"mount\"").unwrap();
+    let numbers = |key: &str| -> Vec<f64> {
+        let words = mount.split_once(key).unwrap().1.split('"').next().unwrap();
+        words.split_whitespace().map(|word| word.parse().unwrap()).collect()
+    };
+    let found = [numbers("xyz=\""), numbers("rpy=\"")].concat();
+    let turn = 30_f64.to_radians();
+    for (found, expected) in found.iter().zip([0.05, -0.02, 0.03, 0.0, 0.0, turn]) {
+        assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+    }
+    // Turns about one axis alone do not tell where along it the camera sits.
+    folder.simulate("p", "one.toml", 40, 1, "p/measurements.csv");
+    let run = folder.flexcal("identify p --out fit --force").success();
+    assert_contains(&run.words(), &["Converged, but the measured poses leave", "one axis only"]);
+    let run = folder.flexcal(&format!("{export} --force --tool-link camera_optical_frame")).code(2);
+    assert_contains(&run.message(), &["do not determine", "of the tool"]);
+    let table = folder.flexcal("export p --estimate fit/estimate.json --format mdh").success();
+    assert_contains(&table.words(), &["= open: the rows do not determine it"]);
+    assert_contains(&table.message(), &["not to be relied upon alone"]);
+}
+
+#[test]
+fn a_fit_of_few_images_is_exported_with_a_warning() {
+    let folder = identified(str::to_owned);
+    let table = folder.read("data.csv");
+    let held_out = |line: &&str| line.starts_with("validation");
+    let (few, more): (Vec<&str>, Vec<&str>) = table.lines().partition(|line| !held_out(line));
+    for (images, verdict, warned) in [
+        (3, "Not judged, because priors decide most of it", "priors decide most of it"),
+        (4, "Converged, but held-out rows miss by", "held-out rows miss by"),
+    ] {
+        let rows = few.iter().take(1 + images * 9).chain(more.iter().take(9)).copied();
+        folder.write("data.csv", rows.collect::<Vec<_>>().join("\n") + "\n");
+        let run = folder.flexcal("identify . --out few --force").success();
+        assert_contains(&run.words(), &[verdict, "Next: flexcal plan"]);
+        let run = folder.flexcal("export . --estimate few/estimate.json --format mdh --force");
+        assert_contains(&run.success().message(), &["not to be relied upon alone", warned]);
+    }
+}
+
+#[test]
+fn a_tag_is_declared_and_its_crossed_corners_are_named() {
+    let folder = Folder::with([
+        ("arm.urdf", ARM),
+        (
+            "truth.toml",
+            "[parameters]\n\"camera[camera].x\" = { mm = 30 }\n\"camera[camera].y\" = { mm = 0 }\n\
+             \"camera[camera].z\" = { mm = 50 }\n\"camera[camera].rx\" = { deg = 2 }\n\
+             \"camera[camera].ry\" = { deg = 0 }\n\"camera[camera].rz\" = { deg = 0 }\n\
+             \"marker[tag].x\" = { mm = 400 }\n\"marker[tag].y\" = { mm = 0 }\n\
+             \"marker[tag].z\" = { mm = 900 }\n\"marker[tag].rx\" = { deg = 170 }\n\
+             \"marker[tag].ry\" = { deg = 10 }\n\"marker[tag].rz\" = { deg = 0 }\n[noise]\n\
+             pixel_sigma_px = 0.2\n",
+        ),
+    ]);
+    folder.flexcal("init arm.urdf --board 9x6x25 --tag 60").code(2);
+    folder.flexcal("init arm.urdf --tip camera_optical_frame --tag 60 --out p").success();
+    let corners = "points_mm = [[-30, 30, 0], [30, 30, 0], [30, -30, 0], [-30, -30, 0]]";
+    assert_contains(&folder.read("p/problem.toml"), &["name = \"tag\"", corners]);
+    folder.simulate("p", "truth.toml", 40, 1, "p/measurements.csv");
+    let table = folder.table("p/measurements.csv");
+    let point = table.place("point");
+    // Another corner first and the other way round is a turn of the tag, a crossing is none.
+    for (order, expected) in [(["3", "2", "1", "0"], 0), (["0", "1", "3", "2"], 2)] {
+        folder.map_rows("p/measurements.csv", |row, line| {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            if row > 0 {
+                cells[point] = order[cells[point].parse::<usize>().unwrap()];
+            }
+            Some(cells.join(","))
+        });
+        let run = folder.flexcal("identify p --out fit --force").code(expected);
+        if expected == 2 {
+            assert_contains(&run.message(), &["fit no pose of marker \"tag\"", "corners 2 and 3"]);
+        }
+    }
+}

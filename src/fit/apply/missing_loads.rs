@@ -60,18 +60,19 @@ pub(crate) fn missing_loads(
     lacking.filter_map(sentence).chain(missing_time(problem, estimate, rows)).collect()
 }
 
-/// Returns a sentence if `rows` lack times, the rows of `estimate` had dates, and an effect depends on
+/// Returns a sentence if `rows` lack times, the rows of `estimate` had times, and an effect depends on
 /// time.
 fn missing_time(
     problem: &Problem,
     estimate: &SavedEstimate,
     rows: &Measurements,
 ) -> Option<String> {
-    let lacks = !rows.time_measured && estimate.start_times.as_ref()?.are_dates();
+    let lacks = !rows.time_measured && estimate.start_times.as_ref()?.first != 0.0;
     let effect = problem.effects.iter().find(|of| of.effect.follows_time()).filter(|_| lacks)?;
     Some(format!(
-        "the table has no column time, and {} depends on it: every row is taken as measured at the \
-         start of the measurements of the estimate; add the column if that is not meant",
+        "the table has no column time, and {} depends on it: rows are taken as measured one a \
+         second from the start of the measurements of the estimate on; add the column if that is \
+         not meant",
         effect.effect.name()
     ))
 }

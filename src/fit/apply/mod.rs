@@ -10,6 +10,7 @@ mod nearest_command;
 pub(super) mod predict;
 pub(super) mod predict_saved;
 pub(super) mod predicted_covariance;
+mod saved_document;
 pub(super) mod saved_estimate;
 pub(super) mod saved_estimate_error;
 mod saved_posterior;

@@ -5,15 +5,15 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
-use serde::Deserialize;
-use serde_json::value::RawValue;
 
+use super::saved_document::{Document, Entry};
 use super::saved_estimate_error::{
     DifferingPart, FORMAT, Format, MAX_FILE_MIB, SavedEstimateError, missing, not_an_estimate,
 };
 use super::saved_posterior::SavedPosterior;
 use crate::error::{binary_format, one_line};
 use crate::files::{Changes, changed_key, read_limited};
+use crate::fit::checks::finding::RESERVATIONS;
 use crate::fit::checks::open_views::MAX_POSE_ERROR;
 use crate::fit::checks::pose_sufficiency::label;
 use crate::fit::{Placement, Strategy};
@@ -39,6 +39,8 @@ pub struct SavedEstimate {
     pub changed_key: Option<String>,
     /// True if no check of the fit reported an error.
     pub trusted: bool,
+    /// Findings that contradict a trusted fit or say that it was not judged, as texts.
+    pub reservations: Vec<String>,
     /// Standard deviation (1 σ) of a measured coordinate, estimated from the scatter of the fit
     /// \[m\]; `None` if the problem declares σ.
     pub estimated_sigma: Option<f64>,
@@ -64,58 +66,6 @@ pub struct SavedEstimate {
     pub(super) parameters: Vec<Entry>,
     /// Uncertainty and noise of the estimate.
     pub(crate) posterior: SavedPosterior,
-}
-
-/// Parameter of the file.
-#[derive(Debug, Clone, Deserialize)]
-pub(super) struct Entry {
-    pub name: String,
-    nominal: f64,
-    pub estimate: f64,
-    /// Standard error of the value, SI; `None` if it has none, or in files of older versions.
-    std_error: Option<f64>,
-    identified: Option<f64>,
-    /// Symbol of the SI unit.
-    unit: Option<String>,
-    /// Standard deviation of the declared prior of the deviation; `None` without a prior, or in
-    /// files of older versions.
-    prior_sigma: Option<f64>,
-    /// False if the strategy held the parameter fixed; `None` in files of older versions.
-    fitted: Option<bool>,
-}
-
-/// Contents of the file, as far as they are read.
-#[derive(Debug, Deserialize)]
-struct Document {
-    /// Name and version of the file format; `None` in files of older versions.
-    format: Option<Format>,
-    problem: String,
-    arm_digest: Option<String>,
-    strategy: Option<String>,
-    trusted: bool,
-    estimated_sigma_mm: Option<f64>,
-    first_time_s: Option<f64>,
-    session_times_s: Option<BTreeMap<String, f64>>,
-    parameters: Vec<Entry>,
-    remainder: Option<RemainderEntry>,
-    measurement_files: Option<Vec<PathBuf>>,
-    prediction: Option<Box<RawValue>>,
-    arm_parts: Option<BTreeMap<String, String>>,
-    covariance: Option<Vec<Vec<Option<f64>>>>,
-    sigma_taken_mm: Option<f64>,
-    noise_factor: Option<f64>,
-    fitted_rows: Option<HashSet<String>>,
-    prior: Option<PriorEntry>,
-}
-
-#[derive(Debug, Deserialize)]
-struct PriorEntry {
-    includes_fleet: Option<bool>,
-}
-
-#[derive(Debug, Deserialize)]
-struct RemainderEntry {
-    file: Option<String>,
 }
 
 impl SavedEstimate {
@@ -213,6 +163,7 @@ impl SavedEstimate {
             noise_factor,
             fitted_rows,
             prior,
+            findings,
         } = match serde_json::from_str(text) {
             Ok(document) => document,
             Err(source) => return Err(not_an_estimate(text, file, source)),
@@ -256,6 +207,12 @@ impl SavedEstimate {
             changes,
             changed_key,
             trusted,
+            reservations: findings
+                .into_iter()
+                .flatten()
+                .filter(|of| RESERVATIONS.iter().any(|code| code.entry().code == of.code))
+                .map(|of| one_line(&of.text))
+                .collect(),
             estimated_sigma,
             start_times: first_time_s
                 .map(|first| StartTimes { first, sessions: session_times_s.unwrap_or_default() }),

@@ -39,7 +39,7 @@ pub(in crate::fit) const MISTAKES: [FindingCode; 7] = [
 
 /// Codes of findings that follow from a mistake of the input. Their usual remedies apply only without
 /// one, and commands do not print them beside it.
-pub(in crate::fit) const CONSEQUENCES: [FindingCode; 10] = [
+pub(in crate::fit) const CONSEQUENCES: [FindingCode; 11] = [
     FindingCode::PriorContradicted,
     FindingCode::PriorWidth,
     FindingCode::NoiseBeyondDeclared,
@@ -48,8 +48,20 @@ pub(in crate::fit) const CONSEQUENCES: [FindingCode; 10] = [
     FindingCode::HeldOutWorse,
     FindingCode::HeldOutBeyondPrediction,
     FindingCode::HeldOutNotBetter,
+    FindingCode::HeldOutUncertain,
     FindingCode::HeldOutOutliers,
     FindingCode::RowsSetAside,
+];
+
+/// Codes of findings for which an exported file is not to be relied upon alone, although no check
+/// objects: they contradict the fit, or say that it could not be judged.
+pub(in crate::fit) const RESERVATIONS: [FindingCode; 6] = [
+    FindingCode::PriorsDecide,
+    FindingCode::RowsChanged,
+    FindingCode::HeldOutBeyondPrediction,
+    FindingCode::HeldOutNotBetter,
+    FindingCode::HeldOutUncertain,
+    FindingCode::SetUpUndecided,
 ];
 
 /// Description of a finding code, one row of the table in `docs/findings.md`.
@@ -254,6 +266,16 @@ finding_codes! {
         "The fit made the error of held-out rows worse than that of the nominal arm, beyond \
          chance.",
         "measure more poses, free fewer parameters, or give narrower priors";
+    HeldOutUncertain: Warning "held-out-uncertain" ["kind", "ratio"]
+        "Pixels that were not fitted are missed by more than three times as much as those fitted, \
+         and the covariance of the fit allows it: the images do not tell enough.",
+        "measure more poses (flexcal plan chooses them)";
+    SetUpUndecided: Warning "set-up-undecided" ["kind", "coordinates", "turn", "across"]
+        "Measured poses with orientations leave coordinates of tool and base open against each \
+         other, because the tool turns about one axis only or not at all: the arm may be right, \
+         the place of what was measured on the hand is not known.",
+        "turn the tool by 30° and more about two axes that are not parallel, or hold or declare \
+         these coordinates";
     BoundInUnidentifiedDirection: Warning "bound-in-unidentified-direction" ["parameter", "bound", "deviation", "partners"]
         "A parameter rests on a bound along a direction that the data hardly see, and others \
          follow it.",

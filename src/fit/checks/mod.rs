@@ -50,7 +50,7 @@ mod view_order;
 use serde_json::Value;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
-use finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, OF_MISFIT};
+use finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, OF_MISFIT, Severity};
 use misreading::first_of;
 
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
@@ -84,6 +84,7 @@ const CHECKS: &[&dyn Check] = &[
     &priors::SigmaIsNotOverstated,
     &prediction::PredictionHolds,
     &prediction::NotWorseThanNominal,
+    &prediction::PredictionIsSure,
     &bounds::BoundsAreSeen,
     &limits::LimitsHold,
     &held_parameters::HeldGeometryIsRight,
@@ -225,6 +226,15 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         }
     }
     state_held_out_remedies(&mut findings);
+    // Other findings say more of the held-out rows.
+    let says_more = |found: &Finding| {
+        found.code.entry().severity == Severity::Error
+            || [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutOutliers]
+                .contains(&found.code)
+    };
+    if findings.iter().any(says_more) {
+        findings.retain(|found| found.code != FindingCode::HeldOutUncertain);
+    }
     findings
 }
 
@@ -295,7 +305,7 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             && is_of_fixture
             && has_readings.is_none_or(Vec::is_empty)
         {
-            let remedy = "follow first what another finding (beyond-prior) says";
+            let remedy = BEYOND_PRIOR_FIRST;
             *finding = finding.clone().with_remedy(remedy.to_owned());
         }
         // Remedies that name a cause stay.

@@ -105,10 +105,14 @@ pub(super) struct NamedDirections;
 
 impl Check for NamedDirections {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        if fit.kinds().iter().all(|kind| kind.observation.is_position()) {
-            return Vec::new();
-        }
+        let are_positions = fit.kinds().iter().all(|kind| kind.observation.is_position());
         let parameters: Vec<&Parameter> = fit.whole.parameters().collect();
+        if are_positions {
+            let is_set_up =
+                |k: &usize| is_base(&parameters[*k].name) || is_tool(&parameters[*k].name);
+            let set_up: Vec<usize> = (0..parameters.len()).filter(is_set_up).collect();
+            return open_views::undecided_set_up(fit, &set_up).into_iter().collect();
+        }
         let model = fit.fitting.model;
         let size = |parameter: &&Parameter| {
             let without_prior = Parameter { sigma: None, ..(*parameter).clone() };

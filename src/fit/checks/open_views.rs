@@ -30,15 +30,7 @@ pub(super) fn undecided(
     poses: &[usize],
     (names, has_focal): (&[String], bool),
 ) -> Option<Finding> {
-    let parameters: Vec<_> = fit.whole.parameters().collect();
-    let is_open = |k: &usize| {
-        let is_informed = parameters[*k].sigma.is_some() || parameters[*k].is_bounded();
-        // A comparison with NaN is false.
-        let is_known = fit.statistics.determined[*k] && fit.statistics.errors[*k] <= MAX_POSE_ERROR;
-        !is_informed && !is_known
-    };
-    let open: Vec<&str> =
-        poses.iter().filter(|k| is_open(k)).map(|&k| &*parameters[k].name).collect();
+    let open = open_coordinates(fit, poses);
     // Coordinates of markers alone have no effect on a row, such as the rotation of a single point.
     if !open.iter().any(|name| name.starts_with("camera[")) && !has_focal || open.is_empty() {
         return None;
@@ -49,30 +41,15 @@ pub(super) fn undecided(
         open.iter().any(|open| open.starts_with(&name))
     };
     let movement = movement(fit, is_involved)?;
-    let Movement { turn, across, shift, frontal } = movement;
-    let degrees = f64::to_degrees;
-    let front = frontal.map(|angle| {
-        format!("see the marker from the front only (within {:.1}° of its normal)", degrees(angle))
+    let front = movement.frontal.map(|angle| {
+        format!(
+            "see the marker from the front only (within {:.1}° of its normal)",
+            angle.to_degrees()
+        )
     });
-    let (kind, why) = match () {
-        () if has_focal && front.is_some() => ("frontal", String::new()),
-        () if turn <= MAX_STILL_TURN && shift <= MAX_STILL_SHIFT => {
-            ("still", "show no movement of the camera against the marker".to_owned())
-        }
-        () if turn <= MAX_STILL_TURN => (
-            "translation",
-            format!("only translate the camera (it turns by at most {:.1}°)", degrees(turn)),
-        ),
-        () if across <= MAX_STILL_TURN => (
-            "one-axis",
-            format!(
-                "turn the camera against the marker about one axis only (by up to {:.0}°, about \
-                 others by at most {:.1}°)",
-                degrees(turn),
-                degrees(across)
-            ),
-        ),
-        () => ("other", "are too few or too alike".to_owned()),
+    let (kind, why) = match movement.reason(["the camera", "the camera against the marker"]) {
+        _ if has_focal && front.is_some() => ("frontal", String::new()),
+        reason => reason,
     };
     let why: Vec<String> =
         [why].into_iter().filter(|why| !why.is_empty()).chain(front.clone()).collect();
@@ -81,7 +58,8 @@ pub(super) fn undecided(
     groups.dedup();
     let (place, of) = (if groups.len() == 1 { "pose" } else { "poses" }, groups.join(" and "));
     let text = format!("the views leave the {place} of {of} open: they {}", why.join(" and "));
-    let numbers = [json!(kind), json!(names), json!(open), turn.into(), across.into()];
+    let numbers =
+        [json!(kind), json!(names), json!(open), movement.turn.into(), movement.across.into()];
     let finding = Finding::new(FindingCode::ViewsUndecided, numbers, text);
     Some(if has_focal {
         finding.with_remedy(
@@ -92,6 +70,40 @@ pub(super) fn undecided(
     } else {
         finding
     })
+}
+
+/// Returns the finding that measured poses leave coordinates of tool and base open, which are the
+/// unknowns with the indices `set_up`. `None` if the tool turns about several axes, if priors or the
+/// rows give all of them, and without orientations.
+pub(super) fn undecided_set_up(fit: &CheckedFit, set_up: &[usize]) -> Option<Finding> {
+    let open = open_coordinates(fit, set_up);
+    if !open.iter().any(|name| name.starts_with("tool")) {
+        return None;
+    }
+    let rows: Vec<Pose> =
+        fit.whole.poses.iter().filter(|pose| pose.orientation.is_some()).copied().collect();
+    let frames = fit.fitting.model.frames(&rows, fit.end.x.as_slice());
+    let mut movement = Movement::default();
+    movement.widen(&frames.into_iter().flatten().collect::<Vec<_>>());
+    let (kind, why) = movement.reason(["the tool", "the tool"]);
+    if rows.is_empty() || kind == "other" {
+        return None;
+    }
+    let text = format!("the measured poses leave {} open: they {why}", open.join(", "));
+    let numbers = [json!(kind), json!(open), movement.turn.into(), movement.across.into()];
+    Some(Finding::new(FindingCode::SetUpUndecided, numbers, text))
+}
+
+/// Returns the names of those of some unknowns that neither priors nor the rows determine.
+fn open_coordinates<'f>(fit: &'f CheckedFit, unknowns: &[usize]) -> Vec<&'f str> {
+    let parameters: Vec<_> = fit.whole.parameters().collect();
+    let is_open = |k: &usize| {
+        let is_informed = parameters[*k].sigma.is_some() || parameters[*k].is_bounded();
+        // A comparison with NaN is false.
+        let is_known = fit.statistics.determined[*k] && fit.statistics.errors[*k] <= MAX_POSE_ERROR;
+        !is_informed && !is_known
+    };
+    unknowns.iter().filter(|k| is_open(k)).map(|&k| &*parameters[k].name).collect()
 }
 
 /// Movement of cameras against the markers that they see, over the views of some pairs.
@@ -106,6 +118,54 @@ struct Movement {
     /// Largest angle between the camera's axis and the normal of the flat marker, if all views are
     /// from the front \[rad\].
     frontal: Option<f64>,
+}
+
+impl Movement {
+    /// Returns the kind of the movement that does not decide a pose, and says it of what moves: its
+    /// name, and its name with what it moves against.
+    fn reason(&self, [what, against]: [&str; 2]) -> (&'static str, String) {
+        let Self { turn, across, shift, .. } = *self;
+        let degrees = f64::to_degrees;
+        match () {
+            () if turn <= MAX_STILL_TURN && shift <= MAX_STILL_SHIFT => {
+                ("still", format!("show no movement of {against}"))
+            }
+            () if turn <= MAX_STILL_TURN => (
+                "translation",
+                format!("only translate {what} (it turns by at most {:.1}°)", degrees(turn)),
+            ),
+            () if across <= MAX_STILL_TURN => (
+                "one-axis",
+                format!(
+                    "turn {against} about one axis only (by up to {:.0}°, about others by at most \
+                     {:.1}°)",
+                    degrees(turn),
+                    degrees(across)
+                ),
+            ),
+            () => ("other", "are too few or too alike".to_owned()),
+        }
+    }
+
+    /// Adds the movement between some frames.
+    fn widen(&mut self, views: &[Frame<f64>]) {
+        let Some(first) = views.first() else { return };
+        let turned = |view: &Frame<f64>| {
+            let change = first.inverse().compose(view);
+            let axes = Matrix3::from_columns(&change.axes);
+            (Rotation3::from_matrix_unchecked(axes).scaled_axis(), change.origin.norm())
+        };
+        let turned: Vec<(Vector3<f64>, f64)> = views.iter().map(turned).collect();
+        let spread: Matrix3<f64> = turned.iter().map(|(turn, _)| turn * turn.transpose()).sum();
+        let eigen = SymmetricEigen::new(spread);
+        let axis = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+        for (turn, shift) in &turned {
+            let across = (turn - axis * axis.dot(turn)).norm();
+            self.turn = self.turn.max(turn.norm());
+            self.across = self.across.max(across);
+            self.shift = self.shift.max(*shift);
+        }
+    }
 }
 
 /// Returns the movement of the cameras and markers for whose index `is_involved` returns true;
@@ -133,22 +193,7 @@ fn movement(fit: &CheckedFit, is_involved: impl Fn(usize) -> bool) -> Option<Mov
                 frames.as_ref().map(|[camera, marker]| relative([camera, marker]))
             })
             .collect();
-        let Some(first) = views.first() else { continue };
-        let turned = |view: &Frame<f64>| {
-            let change = first.inverse().compose(view);
-            let axes = Matrix3::from_columns(&change.axes);
-            (Rotation3::from_matrix_unchecked(axes).scaled_axis(), change.origin.norm())
-        };
-        let turned: Vec<(Vector3<f64>, f64)> = views.iter().map(turned).collect();
-        let spread: Matrix3<f64> = turned.iter().map(|(turn, _)| turn * turn.transpose()).sum();
-        let eigen = SymmetricEigen::new(spread);
-        let axis = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
-        for (turn, shift) in &turned {
-            let across = (turn - axis * axis.dot(turn)).norm();
-            movement.turn = movement.turn.max(turn.norm());
-            movement.across = movement.across.max(across);
-            movement.shift = movement.shift.max(*shift);
-        }
+        movement.widen(&views);
         let [camera, marker] = pair.map(|fixture| &fixtures[fixture]);
         let points = &fit.problem.fixtures[pair[1]].points;
         let normal = marker_normal(points).map(|normal| marker.frame().vector(&normal));

@@ -11,6 +11,7 @@ use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::noise::Noise;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::numeric::parallel;
+use crate::problem::Observation;
 
 /// p-value of the held-out residuals below which they contradict the prediction.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
@@ -22,6 +23,9 @@ const MIN_DIFFERENCE: f64 = 2.0;
 /// Smallest ratio of the rms held-out error of the fitted arm to that of the registered nominal arm
 /// that is more than a difference of rounding.
 const MIN_WORSENING: f64 = 1.0 + 1e-6;
+/// Smallest ratio of the rms error of held-out pixels to that of fitted ones at which the fit is
+/// uncertain.
+const UNCERTAIN_RATIO: f64 = 3.0;
 /// Minimum number of held-out rows from which the mean increase of squared errors is judged.
 const MIN_ROWS: usize = 6;
 
@@ -127,6 +131,24 @@ fn predictive_chi2(
     let matrix = DMatrix::identity(n, n) + products.view((0, 0), (n, n)) * &correlation;
     let explained = vector.dot(&(correlation * matrix.lu().solve(&vector)?));
     Some((products[(n, n)] - explained, coordinates))
+}
+
+/// Checks that pixels that were not fitted are missed by about as much as fitted ones, even where the
+/// covariance of the fit allows more.
+pub(super) struct PredictionIsSure;
+
+impl Check for PredictionIsSure {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let [fitted, held_out] = [&fit.fitted.identification, &fit.fitted.held_out];
+        let ratio = held_out.rms.norm / fitted.rms.norm;
+        let is_of_images = fitted.kind == Observation::Pixel(0, 0, 0).kind();
+        let exceeds_noise = held_out.rms.norm > UNCERTAIN_RATIO * fit.sigma_taken;
+        if !(is_of_images && exceeds_noise && ratio.is_finite() && ratio > UNCERTAIN_RATIO) {
+            return Vec::new();
+        }
+        let text = format!("held-out rows miss by {ratio:.0} times as much as fitted ones");
+        vec![Finding::new(FindingCode::HeldOutUncertain, [fitted.kind.into(), ratio.into()], text)]
+    }
 }
 
 /// Checks that the squared held-out errors of the fitted arm are not significantly larger, in the

@@ -86,7 +86,7 @@ impl Placement {
     /// table. Poses without a time, or of sessions without an earlier start, keep the time since the
     /// first pose of their session.
     pub(crate) fn count_time_from(&self, starts: &StartTimes, poses: &mut [Pose]) {
-        if !self.is_timed && starts.are_dates() {
+        if !self.is_timed {
             return;
         }
         let starts: Vec<Option<f64>> =

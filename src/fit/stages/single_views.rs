@@ -17,6 +17,8 @@ use crate::problem::Observation;
 const MAX_GRID_ERROR: f64 = 1e-6;
 /// Minimum number of points of a view that is fitted by itself.
 const MIN_POINTS: usize = 6;
+/// Number of corners of a tag.
+const CORNERS: usize = 4;
 /// Maximum number of views that are fitted by themselves.
 const MAX_VIEWS: usize = 40;
 /// Smallest rms error of views by themselves \[px\] that shows a mistake in camera or marker:
@@ -35,8 +37,42 @@ const MAX_MISS: f64 = 100.0;
 pub(super) struct SingleViews {
     /// Median rms reprojection error of the views with the points as the table numbers them \[px\].
     pub declared: f64,
-    /// Error with the points of a grid counted along its other side.
-    pub transposed: f64,
+    /// Error with the points numbered in the other way that fits best.
+    pub other: f64,
+    /// That other way.
+    pub numbering: Numbering,
+}
+
+/// Way in which a detector may number the points of a marker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Numbering {
+    /// Point k of the table is point k of the marker.
+    Declared,
+    /// Points of a grid are counted along its other side.
+    Transposed,
+    /// Two of the four corners of a tag are exchanged; the other orders of a square are turns of it.
+    Exchanged([usize; 2]),
+}
+
+impl Numbering {
+    /// Ways other than the declared one.
+    pub const OTHERS: [Self; 3] =
+        [Self::Transposed, Self::Exchanged([2, 3]), Self::Exchanged([1, 2])];
+
+    /// Returns the number of the marker's point that has the number `point` in the table; `None` if
+    /// the marker cannot be numbered so.
+    pub fn of(self, points: &[Vector3<f64>], point: usize) -> Option<usize> {
+        match self {
+            Self::Declared => Some(point),
+            // The grid of a tag looks the same along its other side.
+            Self::Transposed => transposed(points, point).filter(|_| points.len() != CORNERS),
+            Self::Exchanged([a, b]) => (points.len() == CORNERS).then_some(match point {
+                _ if point == a => b,
+                _ if point == b => a,
+                _ => point,
+            }),
+        }
+    }
 }
 
 impl SingleViews {
@@ -54,16 +90,18 @@ impl SingleViews {
         }
         let views: Vec<((usize, usize), Vec<&Pose>)> = views
             .into_iter()
-            .filter(|(_, view)| view.len() >= MIN_POINTS)
+            .filter(|((_, marker, ..), view)| {
+                let is_tag = model.marker_points(*marker).len() == CORNERS;
+                view.len() >= if is_tag { CORNERS } else { MIN_POINTS }
+            })
             .map(|((camera, marker, ..), view)| ((camera, marker), view))
             .collect();
         let step = views.len().div_ceil(MAX_VIEWS).max(1);
-        let errors = |is_transposed: bool| {
+        let errors = |numbering: Numbering| {
             let error = |((camera, marker), view): &((usize, usize), Vec<&Pose>)| {
                 let points = model.marker_points(*marker);
                 let point = |pose: &&Pose| {
-                    let number = pose.observation.point()?;
-                    let number = if is_transposed { transposed(points, number)? } else { number };
+                    let number = numbering.of(points, pose.observation.point()?)?;
                     Some((*points.get(number)?, [pose.measured.x, pose.measured.y]))
                 };
                 let points: Option<Vec<_>> = view.iter().map(point).collect();
@@ -71,8 +109,13 @@ impl SingleViews {
             };
             median(views.iter().step_by(step).map(error).collect())
         };
-        let declared = errors(false)?;
-        Some(Self { declared, transposed: errors(true)? })
+        let declared = errors(Numbering::Declared)?;
+        let others = Numbering::OTHERS.map(|numbering| (errors(numbering), numbering));
+        let (other, numbering) = others
+            .into_iter()
+            .filter_map(|(error, numbering)| Some((error?, numbering)))
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Self { declared, other, numbering })
     }
 
     /// Returns the largest number of points of one camera and marker in one configuration among
@@ -91,10 +134,10 @@ impl SingleViews {
         self.declared > MIN_MISS
     }
 
-    /// Returns true if the points of most views fit the marker once its grid is counted along its
-    /// other side.
-    pub fn are_transposed(self) -> bool {
-        self.miss_the_marker() && self.transposed < MAX_OTHER_RATIO * self.declared.min(MAX_MISS)
+    /// Returns true if the points of most views fit the marker once they are numbered in the other
+    /// way.
+    pub fn are_renumbered(self) -> bool {
+        self.miss_the_marker() && self.other < MAX_OTHER_RATIO * self.declared.min(MAX_MISS)
     }
 }
 
@@ -120,7 +163,7 @@ fn median(mut numbers: Vec<f64>) -> Option<f64> {
 /// side; `None` if the points form no grid that is numbered row by row.
 ///
 /// With R rows of C points, point r C + c of the file has the number c R + r.
-pub(in crate::fit) fn transposed(points: &[Vector3<f64>], point: usize) -> Option<usize> {
+fn transposed(points: &[Vector3<f64>], point: usize) -> Option<usize> {
     let [rows, columns] = grid(points)?;
     Some(point % rows * columns + point / rows)
 }

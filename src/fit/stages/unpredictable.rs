@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use super::fitting::Fitting;
 use super::fixture_location::undecided_views;
 use super::marker_pose::MIN_POINTS_OF_POSE;
-use super::single_views::SingleViews;
+use super::single_views::{Numbering, SingleViews};
 use crate::error::{InputError, InputErrorKind};
 use crate::observation::Needs;
 
@@ -52,10 +52,15 @@ impl Fitting<'_> {
         }
         let error = |([camera, marker], rows): (&[Option<usize>; 2], &Vec<usize>)| {
             let views = SingleViews::of(self.model, &self.poses(rows), x)?;
-            let SingleViews { declared, transposed } = views;
+            let SingleViews { declared, other, numbering } = views;
             let [camera, marker] = [(*camera)?, (*marker)?].map(|of| self.model.fixture_name(of));
-            let kind = InputErrorKind::GridTransposed { camera, marker, declared, transposed };
-            views.are_transposed().then(|| self.measurements.location(rows[0]).error(kind))
+            let crossed = match numbering {
+                Numbering::Exchanged(points) => Some(points),
+                _ => None,
+            };
+            let px = [declared, other];
+            let kind = InputErrorKind::PointsRenumbered { camera, marker, px, crossed };
+            views.are_renumbered().then(|| self.measurements.location(rows[0]).error(kind))
         };
         pairs.iter().find_map(error)
     }

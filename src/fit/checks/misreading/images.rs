@@ -2,7 +2,7 @@
 
 use super::Misreading;
 use super::candidates::MAX_OTHER_CARRIERS;
-use crate::fit::stages::single_views::{between_squares, transposed};
+use crate::fit::stages::single_views::{Numbering, between_squares};
 use crate::measurement::Measurements;
 use crate::observation::FixtureKind;
 use crate::problem::{Fixture, Observation, Problem};
@@ -25,8 +25,12 @@ pub(super) fn of_images(problem: &Problem, table: &Measurements) -> Vec<Misreadi
     let squares = (0..table.len()).all(is_inner).then_some(Misreading::Squares);
     let from_one = from_one.into_iter().chain(squares);
     let shifts = [-1, 1].map(|by| Misreading::ShiftedViews { by });
-    let axes = [Misreading::ExchangedAxes, Misreading::FromBottom, Misreading::Transposed];
-    let mut misreadings: Vec<Misreading> = axes.into_iter().chain(shifts).chain(from_one).collect();
+    let axes = [Misreading::ExchangedAxes, Misreading::FromBottom];
+    let markers = || problem.fixtures.iter().map(|marker| &marker.points[..]);
+    let is_possible = |numbering: &Numbering| markers().any(|of| numbering.of(of, 0).is_some());
+    let numberings = Numbering::OTHERS.into_iter().filter(is_possible).map(Misreading::Renumbered);
+    let mut misreadings: Vec<Misreading> =
+        axes.into_iter().chain(numberings).chain(shifts).chain(from_one).collect();
     let of_kind = |wanted: FixtureKind| {
         let fixtures = problem.fixtures.iter().enumerate();
         fixtures.filter(move |(_, fixture)| fixture.kind == wanted)
@@ -62,15 +66,17 @@ impl Misreading {
                         pixel.y = height - pixel.y;
                     }
                 }
-                _ => {
+                Self::Renumbered(_) | Self::Squares => {
                     let points = problem.fixtures.get(marker as usize).map(|of| &of.points[..]);
-                    let is_squares = matches!(self, Self::Squares);
-                    let meant = if is_squares { between_squares } else { transposed };
-                    let other = points.and_then(|points| meant(points, point as usize));
+                    let other = points.and_then(|points| match self {
+                        Self::Renumbered(numbering) => numbering.of(points, point as usize),
+                        _ => between_squares(points, point as usize),
+                    });
                     if let Some(other) = other.and_then(|other| u32::try_from(other).ok()) {
                         *observation = Observation::Pixel(camera, marker, other);
                     }
                 }
+                _ => {}
             }
         }
     }
@@ -106,4 +112,9 @@ pub(super) fn shift_views(
             q.copy_from_slice(table.configuration(source));
         }
     }
+}
+
+/// Returns the name of a camera or marker.
+pub(super) fn name_of_fixture(problem: &Problem, fixture: usize) -> String {
+    problem.fixtures.get(fixture).map_or_else(String::new, |of| format!("\"{}\"", of.name))
 }

@@ -33,6 +33,7 @@ pub(in crate::fit) use search::{MAX_CLEAR_RATIO, MAX_NOISE_SIGMAS};
 pub(in crate::fit) use some_rows::reading_of_rows;
 pub(in crate::fit) use views::{start_of_fit, with_readings};
 
+use crate::fit::stages::single_views::Numbering;
 use crate::model::parameter::JointField;
 
 /// Misreading: a quantity of table or problem that may have been declared in the wrong unit, sign,
@@ -322,8 +323,9 @@ pub enum Misreading {
     ExchangedAxes,
     /// Rows of pixels are counted from the bottom of the image.
     FromBottom,
-    /// The points of a marker, which form a grid, are numbered column by column.
-    Transposed,
+    /// The points of a marker are numbered in another way: a grid column by column, or the corners of
+    /// a tag across it.
+    Renumbered(Numbering),
     /// The points of a marker are numbered from 1 instead of 0.
     FromOne,
     /// The points of a marker are declared by squares, and corners between them are numbered.

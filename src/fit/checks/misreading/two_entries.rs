@@ -58,3 +58,17 @@ impl Misreading {
         problem.standard_rows().map(|_| format!("rows {} and {} of the table", one - 1, other - 1))
     }
 }
+
+/// Returns the name of an entry of the joint table, such as `alpha of joint 3`; `joint` is 0 for
+/// all joints.
+pub(super) fn entry_name(joint: usize, field: JointField) -> String {
+    let name = match field {
+        JointField::A => "the length a",
+        JointField::D => "the offset d",
+        _ => field.name(),
+    };
+    match joint {
+        0 => format!("{name} of all joints"),
+        _ => format!("{name} of joint {joint}"),
+    }
+}

@@ -333,7 +333,7 @@ impl Misreading {
             }
             Self::ExchangedAxes
             | Self::FromBottom
-            | Self::Transposed
+            | Self::Renumbered(_)
             | Self::FromOne
             | Self::Squares => {
                 self.undo_image(&mut rows, problem);

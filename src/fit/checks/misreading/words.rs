@@ -5,31 +5,15 @@ use std::fmt;
 
 use super::candidates::name_of_mass;
 use super::commands::MILLIRADIANS;
+use super::images::name_of_fixture;
+use super::two_entries::entry_name;
 use super::{MassScale, Misreading, POSITION_UNITS, numbers_of, power_of_ten};
 use crate::error::Location;
+use crate::fit::stages::single_views::Numbering;
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::fixture::carrier_word;
 use crate::problem::{Fixture, JointKind, Problem};
-
-/// Returns the name of an entry of the joint table, such as `alpha of joint 3`; `joint` is 0 for
-/// all joints.
-fn entry_name(joint: usize, field: JointField) -> String {
-    let name = match field {
-        JointField::A => "the length a",
-        JointField::D => "the offset d",
-        _ => field.name(),
-    };
-    match joint {
-        0 => format!("{name} of all joints"),
-        _ => format!("{name} of joint {joint}"),
-    }
-}
-
-/// Returns the name of a camera or marker.
-fn name_of_fixture(problem: &Problem, fixture: usize) -> String {
-    problem.fixtures.get(fixture).map_or_else(String::new, |of| format!("\"{}\"", of.name))
-}
 
 impl Misreading {
     /// Describes the misreading with its fitted `size` (an angle \[rad\], a ratio, or rad/m), if it
@@ -306,7 +290,12 @@ impl fmt::Display for Misreading {
             Self::FromBottom => f.write_str(
                 "a column v that counts from the bottom of the image (write height − v)",
             ),
-            Self::Transposed => f.write_str(
+            Self::Renumbered(Numbering::Exchanged([a, b])) => write!(
+                f,
+                "corners {a} and {b} of a tag that are exchanged (points_mm crosses it, detectors go \
+                 round)"
+            ),
+            Self::Renumbered(_) => f.write_str(
                 "points of the marker that are numbered along the other side (its rows and \
                  columns exchanged)",
             ),
@@ -321,13 +310,6 @@ impl fmt::Display for Misreading {
                 let plural = if views == 1 { "" } else { "s" };
                 write!(f, "images that belong to the configuration {views} view{plural} {side}")
             }
-            Self::Zero { joint, degrees } => {
-                write!(f, "joint {joint} whose zero position is {degrees}° off")
-            }
-            Self::Ratio { joint, percent } => {
-                let ratio = f64::from(percent) / 100.0;
-                write!(f, "joint {joint} that turns by {ratio} times its command")
-            }
             _ => self.fmt_of_commands(f),
         }
     }
@@ -337,6 +319,13 @@ impl Misreading {
     /// Writes the description of a misreading of joint columns.
     fn fmt_of_commands(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Zero { joint, degrees } => {
+                write!(f, "joint {joint} whose zero position is {degrees}° off")
+            }
+            Self::Ratio { joint, percent } => {
+                let ratio = f64::from(percent) / 100.0;
+                write!(f, "joint {joint} that turns by {ratio} times its command")
+            }
             Self::MixedUnits { joints, is_radians } => {
                 let [found, declared] =
                     if is_radians { ["radians", "degrees"] } else { ["degrees", "radians"] };
