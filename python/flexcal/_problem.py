@@ -128,7 +128,7 @@ class Problem(Forward):
         if target_m is not None:
             tool["target_m"] = toml_point("target_m", target_m)
         if payload_kg is not None:
-            tool["payload_kg"] = toml_number("payload_kg", payload_kg)
+            tool["payload_kg"] = toml_number("payload_kg", payload_kg, zero=True)
         if payload_at_m is not None:
             tool["payload_at_m"] = toml_point("payload_at_m", payload_at_m)
         if reference_temperature_C is not None:

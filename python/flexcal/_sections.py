@@ -15,11 +15,11 @@ HeldOut: TypeAlias = "Literal['none'] | float | str"
 """Rows that judge and are not fitted: none, their fraction, or the name of a session."""
 
 
-def toml_number(name: str, value: float) -> str:
-    """A number above 0 as TOML."""
+def toml_number(name: str, value: float, zero: bool = False) -> str:
+    """A number above 0, or at ``zero`` also 0, as TOML."""
     number = float(value)
-    if not (math.isfinite(number) and number > 0.0):
-        raise InputError(f"{name}: {value!r} is not above 0", key=name)
+    if not (math.isfinite(number) and (number > 0.0 or (zero and number == 0.0))):
+        raise InputError(f"{name}: {value!r} is {'below' if zero else 'not above'} 0", key=name)
     return repr(number)
 
 
@@ -39,7 +39,10 @@ def toml_held_out(held_out: HeldOut) -> str:
 
 def toml_point(name: str, point: Sequence[float]) -> str:
     """Three coordinates as TOML."""
-    values = np.asarray(point, dtype=float)
+    try:
+        values = np.asarray(point, dtype=float)
+    except (TypeError, ValueError):
+        values = np.empty(0)
     if values.shape != (3,) or not np.isfinite(values).all():
         raise InputError(f"{name}: three finite numbers are needed, x, y, z, not {point!r}", key=name)
     return repr(values.tolist())
