@@ -173,3 +173,14 @@ fn an_arm_that_bends_against_its_load_is_named() {
     assert!((finding.number("compliance").unwrap() + 4e-5).abs() < 2e-6, "{finding}");
     assert!(finding.remedy.contains("write gravity_m_s2 = [0, 0, -9.80665]"), "{finding}");
 }
+
+#[test]
+fn payloads_in_pounds_in_some_rows_are_named() {
+    let mut data = measured();
+    let payloads = data.measurements.payload.as_mut().unwrap();
+    payloads[..20].iter_mut().for_each(|payload| *payload /= 0.453_592_37);
+    let found = fit_as_command(&arm(5.2), &data);
+    let text = found.finding(FindingCode::Misread).map(ToString::to_string);
+    let is_named = |text: &String| text.contains("payloads before") && text.contains("in pounds");
+    assert!(text.as_ref().is_some_and(is_named), "{text:?}");
+}

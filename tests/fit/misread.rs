@@ -213,3 +213,52 @@ fn inverse_poses_are_named() {
     let words = named(&problem, &data, FindingCode::Misread);
     assert!(words.contains("poses that are inverse"), "{words}");
 }
+
+#[test]
+fn a_number_of_the_joint_table_that_was_typed_wrongly_is_named() {
+    let cases: [(fn(&mut Problem), &str); 2] = [
+        (|arm| arm.joints[2].a = 0.96, "a of joint 3 that is about"),
+        (|arm| arm.joints[3].alpha += 0.7, "alpha of joint 4 that is about -"),
+    ];
+    for (mistake, words) in cases {
+        let (mut problem, data) = arm();
+        mistake(&mut problem);
+        let text = named(&problem, &data, FindingCode::Misread);
+        assert!(text.contains(words), "{words}: {text}");
+    }
+}
+
+#[test]
+fn two_mistakes_at_once_are_named() {
+    let (mut problem, mut data) = arm();
+    problem.joints[1].theta += std::f64::consts::FRAC_PI_2;
+    data.measurements.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
+    let text = named(&problem, &data, FindingCode::Misread);
+    assert!(text.contains("two of x, y and z") && text.contains("joint 2 whose zero"), "{text}");
+}
+
+#[test]
+fn a_misreading_beside_wrong_rows_is_named() {
+    let (problem, mut data) = arm();
+    let joints = data.measurements.joints;
+    for row in 0..90 {
+        data.measurements.configurations[row * joints + 2] *= -1.0;
+    }
+    for row in [11, 43] {
+        data.measurements.positions[row].x += 0.7;
+    }
+    let text = named(&problem, &data, FindingCode::Misread);
+    assert!(text.contains("joint 3 that counts the other way"), "{text}");
+    assert!(text.contains("which are wrong besides"), "{text}");
+}
+
+#[test]
+fn a_row_that_one_of_two_joined_tables_lacks_is_named() {
+    let (problem, mut data) = arm();
+    // The table of positions lacks row 17.
+    for row in 17..89 {
+        data.measurements.positions[row] = data.measurements.positions[row + 1];
+    }
+    let text = named(&problem, &data, FindingCode::Misread);
+    assert!(text.contains("configuration 1 row after, from"), "{text}");
+}

@@ -317,3 +317,29 @@ fn a_probe_that_is_mounted_in_another_way_is_no_misread_table() {
     let beyond = found.finding(FindingCode::BeyondPrior).unwrap().to_string();
     assert!(beyond.starts_with("tool.r"), "{beyond}");
 }
+
+#[test]
+fn orientations_of_other_rows_and_of_a_turned_target_are_named() {
+    let problem = ur10();
+    let (_, data) = rig(&problem, 60, 3, "held_out = 0.3\n");
+    let turns = data.measurements.orientations.clone().unwrap();
+    let quarter = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, 1.57));
+    let reordered = |turn: &UnitQuaternion<f64>| {
+        let (x, y, z) = turn.euler_angles();
+        UnitQuaternion::from_scaled_axis(Vector3::new(z, y, x))
+    };
+    let late = |row: usize| turns[row.saturating_sub(1)];
+    let turned = |row: usize| if row < 30 { turns[row] } else { turns[row] * quarter };
+    let cases: [(&dyn Fn(usize) -> UnitQuaternion<f64>, &str); 3] = [
+        (&late, "each orientation belongs to the row before"),
+        (&turned, "on the measured frame is turned by 90.0°"),
+        (&|row| reordered(&turns[row]), "R = Rz Ry Rx whose columns hold z, y, x"),
+    ];
+    for (turn, words) in cases {
+        let mut data = data.clone();
+        data.measurements.orientations = Some((0..turns.len()).map(turn).collect());
+        let found = fit(&problem, &data);
+        let remedy = found.finding(FindingCode::OrientationMisfit).map(|of| of.remedy.clone());
+        assert!(remedy.as_ref().is_some_and(|of| of.contains(words)), "{words}: {remedy:?}");
+    }
+}

@@ -15,6 +15,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::row_steps::{Linear, MIN_ROWS, Place, Places, Step};
+use super::turned_target::turn_of_target;
 use crate::fit::uncertainty::noise::Noise;
 use crate::least_squares::Loss;
 use crate::model::parameter::{JointField, Parameter, ParameterSite, Regressor};
@@ -420,8 +421,12 @@ fn described(fit: &CheckedFit, columns: &[usize], step: &Step) -> (String, Strin
         squares.map(|(_, change)| change * change).sum::<f64>().sqrt()
     };
     match step.place {
-        Place::Target(_) => (
-            format!("the target sits {:.1} mm elsewhere in its frame", 1e3 * length(0)),
+        Place::Target(target) => (
+            format!(
+                "the target sits {:.1} mm elsewhere in its frame{}",
+                1e3 * length(0),
+                turn_of_target(fit, target, (columns, step)).unwrap_or_default()
+            ),
             "if the reflector was put into another nest, or the tool was changed, give these \
              rows another word in a column target"
                 .to_owned(),

@@ -10,7 +10,7 @@ use crate::problem::RotationKind;
 
 /// Largest ratio of the rms orientation error with another convention to that with the declared
 /// one, at which the other convention explains the error.
-const MAX_EXPLAINED_RATIO: f64 = 0.2;
+pub(super) const MAX_EXPLAINED_RATIO: f64 = 0.2;
 /// Largest ratio of the error with a convention to that with the best one, at which the convention
 /// is also named.
 const MAX_RATIO_TO_BEST: f64 = 1.5;
@@ -158,6 +158,23 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
             Box::new(move |q| table_numbers(kind, q).map(|angles| euler(order, &angles)).to_vec());
         readings.push((format!("Euler angles with R = R{a} R{b} R{c}"), of_order));
     }
+    // The columns may hold the angles in another order than x, y, z.
+    let three_axes = || ROTATION_AXES.into_iter().filter(|order| order[0] != order[2]);
+    for (order, columns) in three_axes().flat_map(|order| three_axes().map(move |of| (order, of))) {
+        let moved = move |angles: &Vector3<f64>| {
+            let mut of_axes = Vector3::zeros();
+            (0..3).for_each(|column| of_axes[columns[column]] = angles[column]);
+            euler(order, &of_axes)
+        };
+        let of_order: Reading =
+            Box::new(move |q| table_numbers(kind, q).map(|of| moved(&of)).to_vec());
+        let letters = |axes: [usize; 3]| axes.map(|axis| ['x', 'y', 'z'][axis]);
+        let ([a, b, c], [x, y, z]) = (letters(order), letters(columns));
+        let name = format!("Euler angles with R = R{a} R{b} R{c} whose columns hold {x}, {y}, {z}");
+        if columns != [0, 1, 2] {
+            readings.push((name, of_order));
+        }
+    }
     readings
 }
 
@@ -257,7 +274,7 @@ fn misfit(pairs: &[(UnitQuaternion<f64>, UnitQuaternion<f64>)], reading: &Readin
 }
 
 /// Returns the mean of some rotations, whose squared chords to them are smallest.
-fn mean_rotation(rotations: &[UnitQuaternion<f64>]) -> UnitQuaternion<f64> {
+pub(super) fn mean_rotation(rotations: &[UnitQuaternion<f64>]) -> UnitQuaternion<f64> {
     let mut sum = Matrix4::zeros();
     for rotation in rotations {
         sum += rotation.coords * rotation.coords.transpose();

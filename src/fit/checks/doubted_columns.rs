@@ -181,10 +181,13 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
             format!("{} its numbers are too {size} by {by:.0}°", in_rows(rows, run))
         }
     };
+    let with = match relation {
+        Some(Relation::OfNeighbour(_)) => "its numbers moved by a row".to_owned(),
+        _ => format!("joint {} found from each position", joint + 1),
+    };
     let text = format!(
-        "the positions do not follow the column {name}: with joint {} found from each position, the \
-         nominal arm misses by {} instead of {}; {what}",
-        joint + 1,
+        "the positions do not follow the column {name}: with {with}, the nominal arm misses by {} \
+         instead of {}; {what}",
         format_error("position", after, 1),
         format_error("position", fit.registered.identification.rms.norm, 1)
     );
@@ -282,9 +285,13 @@ fn of_other_rows(fit: &CheckedFit, before: f64) -> Option<Finding> {
     } else {
         let text = format!(
             "the positions do not depend on the column {}, but those of the nominal arm do: the column \
-             is in another order than the other columns, as one that was sorted by itself, or of other \
-             poses",
-            names.join(", ")
+             is in another order than the other columns{}, or of other poses",
+            names.join(", "),
+            if found.iter().all(|&joint| is_sorted(&commands(rows, joint))) {
+                ", as one that was sorted by itself"
+            } else {
+                ""
+            }
         );
         (text, "copy the column again, with all columns of a row together")
     };

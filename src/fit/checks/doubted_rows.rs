@@ -11,6 +11,7 @@ use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, Misfit};
 use super::mistaken_rows::{MistakenRows, of_rows};
 use super::row_kind::format_error;
 use crate::measurement::Split;
+use crate::numeric::median;
 
 /// Number of successive rows of each base to which the nominal arm is registered in a trial. They
 /// determine base and tool.
@@ -21,6 +22,10 @@ const MAX_TRIALS: usize = 12;
 const MAX_RATIO: f64 = 0.2;
 /// Largest error of a row that fits, as a multiple of the rms error that is not reported as a misfit.
 const MAX_OF_RMS: f64 = 2.5;
+/// Maximum number of held-out rows that the text names.
+const MAX_HELD_OUT: usize = 3;
+/// Largest ratio of the error of a row that fits to the median error of all rows.
+const MAX_RATIO_TO_MEDIAN: f64 = 4.0;
 /// Smallest share of the rows that fit without the others if no mistake in the others is found. With
 /// fewer, the others may be right.
 const MIN_SHARE: f64 = 0.6;
@@ -55,6 +60,8 @@ struct Trial {
     errors: Vec<Vector3<f64>>,
     /// Places of the rows that fit, in the list of examined rows.
     near: Vec<usize>,
+    /// Largest error of a row that fits \[m\].
+    limit: f64,
 }
 
 /// Returns the finding on rows without which the nominal arm fits; `before` is the rms error of the
@@ -65,19 +72,22 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
     let unreported = (MAX_MISS * kind.spread).max(noise);
     let limit = (MAX_RATIO * before).min(MAX_OF_RMS * unreported);
-    let registered = |chosen: &[usize]| -> Option<Trial> {
+    let registered = |chosen: &[usize], is_first: bool| -> Option<Trial> {
         let chosen: Vec<usize> = chosen.iter().map(|&place| rows[place]).collect();
         let x = registration(fit, chosen)?;
         let errors = fit.fitting.position_errors(rows, &x);
+        // Few wrong rows leave a small rms error, which the nominal arm may exceed in many rows.
+        let usual = MAX_RATIO_TO_MEDIAN * median(errors.iter().map(nalgebra::Matrix::norm))?;
+        let limit = if is_first { limit } else { limit.max(usual.min(before)) };
         let near = |place: &usize| errors[*place].norm() < limit;
         let near = (0..rows.len()).filter(near).collect();
-        Some(Trial { x, errors, near })
+        Some(Trial { x, errors, near, limit })
     };
     let windows = windows(fit, rows);
-    let trials = windows.iter().filter_map(|window| registered(window));
+    let trials = windows.iter().filter_map(|window| registered(window, true));
     let mut trial = trials.max_by_key(|trial| trial.near.len())?;
     for _ in 0..PASSES {
-        trial = registered(&trial.near)?;
+        trial = registered(&trial.near, false)?;
     }
     // Fewer rows than those of a trial do not tell the arm from others.
     if trial.near.len() < WINDOW {
@@ -96,7 +106,7 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let place = |place: usize| measurements.location(rows[place]).to_string();
     let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
     let kept: Vec<usize> = trial.near.iter().map(|&place| rows[place]).collect();
-    let cause = MistakenRows { fit, x: &trial.x, rows: &chosen, limit }
+    let cause = MistakenRows { fit, x: &trial.x, rows: &chosen, limit: trial.limit }
         .cause()
         .or_else(|| of_other_target(fit, &chosen, &kept).filter(|_| !are_few));
     if cause.is_none() && are_few {
@@ -111,8 +121,20 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         format!("the rows {}{more}", shown.join(", "))
     };
+    let is_position = |row: &usize| measurements.observation(*row).is_position();
+    let held_out: Vec<usize> =
+        fit.fitting.split.held_out.iter().copied().filter(is_position).collect();
+    let errors = fit.fitting.position_errors(&held_out, &trial.x);
+    let far = held_out.iter().zip(&errors).filter(|(_, of)| of.norm() > before.max(trial.limit));
+    let far: Vec<String> =
+        far.map(|(&row, _)| measurements.location(row).to_string()).take(MAX_HELD_OUT).collect();
+    let far = if far.is_empty() {
+        String::new()
+    } else {
+        format!(", and {} of the held-out rows", far.join(", "))
+    };
     let text = format!(
-        "{listed} ({} of {}) contradict the others: without them the nominal arm misses by {} instead of \
+        "{listed} ({} of {}{far}) contradict the others: without them the nominal arm misses by {} instead of \
          {}; {cause}",
         apart.len(),
         rows.len(),

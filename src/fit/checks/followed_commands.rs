@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::checked_fit::CheckedFit;
 use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL};
+use super::mistaken_rows::registration_error;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::{Measurements, Split};
 use crate::problem::JointKind;
@@ -34,7 +35,8 @@ const MAX_RATIO_TO_OTHERS: f64 = 0.3;
 pub(super) struct Unrelated {
     /// Index of the joint.
     pub joint: usize,
-    /// Error of the registered nominal arm with the coordinate found from each position \[m\].
+    /// Error of the registered nominal arm with the coordinate found from each position, or taken from
+    /// the row beside \[m\].
     pub after: f64,
     /// Relation of the found coordinates to those of the column; `None` if none is seen.
     pub relation: Option<Relation>,
@@ -90,23 +92,10 @@ const MIN_HELD: usize = 4;
 /// numbers of its `column` in all rows \[rad\]. Each row is given with its number and the found
 /// coordinate.
 fn relation(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
-    let count = found.len() as f64;
-    // The angle by which most of some differences agree.
-    let common = |of: &[f64]| {
-        let near = |angle: &&f64| of.iter().filter(|other| is_near(*other - **angle)).count();
-        of.iter().max_by_key(near).map_or((0.0, 0), |angle| (wrapped(*angle), near(&angle)))
-    };
+    // The angle by which most differences agree.
     let from_own: Vec<f64> = found.iter().map(|of| of.2 - of.1).collect();
-    let (zero, agreeing) = common(&from_own);
-    let is_most = |agreeing: usize| agreeing as f64 >= MIN_RELATED_SHARE * count;
-    for (neighbour, by) in [(Neighbour::Before, 1), (Neighbour::After, -1)] {
-        let number = |row: usize| column.get(row.checked_add_signed(by)?);
-        let from_other: Vec<f64> =
-            found.iter().filter_map(|of| Some(of.2 - number(of.0)?)).collect();
-        if is_most(common(&from_other).1) && !is_most(agreeing) {
-            return Some(Relation::OfNeighbour(neighbour));
-        }
-    }
+    let near = |angle: &&f64| from_own.iter().filter(|other| is_near(*other - **angle)).count();
+    let zero = from_own.iter().max_by_key(near).map_or(0.0, |angle| wrapped(*angle));
     related(found, column).or_else(|| {
         // The pose of the base may make up for an angle that all coordinates have in common.
         let aligned: Vec<(usize, f64, f64)> = found
@@ -177,6 +166,11 @@ pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Opti
     if rows.len() < MIN_ROWS {
         return None;
     }
+    let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
+    let limit = (MAX_RATIO * before).min((MAX_MISS * kind.spread).max(noise));
+    if let Some(late) = of_neighbour(fit, &rows, joints).filter(|late| late.after < limit) {
+        return Some(late);
+    }
     let error = |&joint: &usize| {
         let (error, found) = error_without(fit, &rows, joint)?;
         Some((joint, error, found))
@@ -184,8 +178,6 @@ pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Opti
     let mut errors: Vec<(usize, f64, Vec<f64>)> = joints.iter().filter_map(error).collect();
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let &(joint, after, ref found) = errors.first()?;
-    let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
-    let limit = (MAX_RATIO * before).min((MAX_MISS * kind.spread).max(noise));
     let is_alone = errors.get(1).is_none_or(|next| after < MAX_RATIO_TO_OTHERS * next.1);
     let command = |row: usize| fit.fitting.measurements.configuration(row)[joint];
     let pairs = rows.iter().zip(found).map(|(&row, &coordinate)| (row, command(row), coordinate));
@@ -196,6 +188,31 @@ pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Opti
         after,
         relation: relation(&pairs.collect::<Vec<_>>(), &column).filter(|_| is_turning),
     })
+}
+
+/// Returns the column of which each number belongs to the row before, or after, with the smallest
+/// error of the registered nominal arm.
+fn of_neighbour(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -> Option<Unrelated> {
+    let table = fit.fitting.measurements;
+    let moved = |&(joint, neighbour): &(usize, Neighbour)| {
+        let by = if neighbour == Neighbour::Before { 1 } else { -1 };
+        let source = |row: usize| row.checked_add_signed(by).filter(|row| *row < table.len());
+        let pairs = rows.iter().filter_map(|&row| {
+            let coordinate = table.configuration(source(row)?)[joint];
+            Some((row, coordinate))
+        });
+        let (rows, coordinates): (Vec<usize>, Vec<f64>) = pairs.unzip();
+        let mut corrected = table.clone();
+        set(&mut corrected, &rows, (joint, &coordinates));
+        let after = registration_error(fit, &corrected, &rows)?;
+        Some(Unrelated { joint, after, relation: Some(Relation::OfNeighbour(neighbour)) })
+    };
+    let columns: Vec<(usize, Neighbour)> = joints
+        .iter()
+        .flat_map(|&joint| [Neighbour::Before, Neighbour::After].map(|of| (joint, of)))
+        .collect();
+    let moved = columns.iter().filter_map(moved);
+    moved.min_by(|a, b| a.after.total_cmp(&b.after))
 }
 
 /// Returns the rms error of the registered nominal arm in `rows` with the coordinates of a joint

@@ -236,7 +236,7 @@ impl Check for HeldOutReached {
 
 /// Returns the words for the mistake with which the fitted arm predicts held-out `rows` of a kind
 /// about as well as it fits the others; `None` if there is none, or if the fit is far off too.
-fn mistake(
+pub(super) fn mistake(
     fit: &CheckedFit,
     kind: &RowKind,
     (rows, errors): (&[usize], &[Vector3<f64>]),

@@ -5,7 +5,9 @@ use serde_json::json;
 use super::checked_fit::{Check, CheckedFit};
 use super::contradicted_entry::exchanged_targets;
 use super::finding::{Finding, FindingCode};
-use super::misreading::{MAX_CLEAR_RATIO, MAX_NOISE_SIGMAS, first_of, misread_masses};
+use super::misreading::{
+    MAX_CLEAR_RATIO, MAX_NOISE_SIGMAS, error_with_priors, first_of, misread_masses,
+};
 use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::format_error;
@@ -17,11 +19,15 @@ const MIN_SIGMAS: f64 = 10.0;
 /// are searched if no σ is declared.
 const MIN_PART: f64 = 0.01;
 
-/// Smallest rms residual of the fit, as a multiple of the declared σ, for which wrong masses and
-/// their places are searched on an arm that gives way.
+/// Smallest rms residual of the fit with the deviations from priors, as a multiple of the declared σ,
+/// for which wrong masses and their places are searched on an arm that gives way.
 const MIN_SIGMAS_OF_MASSES: f64 = 1.7;
 /// Largest share of the variance beyond the noise that a corrected mass leaves.
 const MAX_EXCESS_LEFT_BY_MASS: f64 = 0.04;
+/// Standard deviations of χ² of noise, relative to its mean, that a corrected mass may leave in small
+/// tables, and the largest share of the variance beyond the noise that this may be.
+const CHANCE_SIGMAS: f64 = 2.33;
+const MAX_CHANCE_LEFT_BY_MASS: f64 = 0.1;
 /// Largest rms residual of a fit with a mass corrected, as a multiple of the declared σ, with which
 /// the mass explains what a fit near the noise leaves.
 const MAX_SIGMAS_LEFT_BY_MASS: f64 = 1.5;
@@ -60,9 +66,14 @@ impl Check for ReadAsMeant {
         let is_searched = fit.has_further_fits && kind.observation.is_position();
         let noise = kind.declared_sigma.filter(|_| is_searched);
         let noise = noise.map(|sigma| kind.observation.expected_norm() * sigma);
-        let most_left = noise.filter(|noise| rms > MIN_SIGMAS_OF_MASSES * noise).map(|noise| {
-            let excess = (rms / noise).powi(2) - 1.0;
-            let left = (1.0 + MAX_EXCESS_LEFT_BY_MASS * excess).sqrt();
+        // With few rows, the priors give way before the residual grows.
+        let error = if fit.problem.is_elastic() { error_with_priors(fit).max(rms) } else { rms };
+        let most_left = noise.filter(|noise| error > MIN_SIGMAS_OF_MASSES * noise).map(|noise| {
+            let excess = (error / noise).powi(2) - 1.0;
+            // Of few rows, chance alone may leave more.
+            let chance = CHANCE_SIGMAS * (2.0 / (3.0 * kind.rows.len() as f64)).sqrt();
+            let chance = chance.min(MAX_CHANCE_LEFT_BY_MASS * excess);
+            let left = (1.0 + chance.max(MAX_EXCESS_LEFT_BY_MASS * excess)).sqrt();
             left.min(MAX_SIGMAS_LEFT_BY_MASS) * noise
         });
         let of_masses;

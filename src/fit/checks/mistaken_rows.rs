@@ -21,6 +21,10 @@ const MIN_MOVED_ROWS: usize = 6;
 const MIN_REGISTERED_ROWS: usize = 12;
 /// Largest ratio of the error with a moved base to that with a moved target, at which the base moved.
 const MAX_RATIO_TO_TARGET: f64 = 0.5;
+/// Maximum number of different payloads of a table that are tried in each row.
+const MAX_PAYLOADS: usize = 12;
+/// Maximum number of rows that the words list.
+const MAX_LISTED: usize = 3;
 /// Units of a length that a table may confuse: factors of the measured numbers, with their words.
 const LENGTH_FACTORS: [(f64, &str); 6] = [
     (1e3, "multiply them by 1000"),
@@ -54,6 +58,7 @@ impl MistakenRows<'_, '_> {
         let pairs = measured.zip(errors).map(|(measured, error)| (measured, measured - error));
         let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = pairs.collect();
         self.of_other_word()
+            .or_else(|| self.of_other_payload())
             .or_else(|| mistake(&pairs, self.limit))
             .or_else(|| self.of_other_joint_angles())
             .or_else(|| self.of_joints())
@@ -97,6 +102,43 @@ impl MistakenRows<'_, '_> {
             "they fit in {column} {} instead: correct the column {column}",
             found.join(" or ")
         ))
+    }
+
+    /// Returns the words for rows that each fit with a payload that other rows of the table have.
+    fn of_other_payload(&self) -> Option<String> {
+        let table = self.fit.fitting.measurements;
+        let column = table.payload.as_ref()?;
+        let mut levels = column.clone();
+        levels.sort_by(f64::total_cmp);
+        levels.dedup();
+        if levels.len() > MAX_PAYLOADS {
+            return None;
+        }
+        // The best payload of each row, and its error.
+        let mut best: Vec<(f64, f64)> = vec![(0.0, f64::INFINITY); self.rows.len()];
+        for level in levels {
+            let mut corrected = table.clone();
+            corrected.payload = Some(vec![level; column.len()]);
+            let Fitting { placement, model, .. } = *self.fit.fitting;
+            let errors = placement.position_errors(model, self.x, &corrected, self.rows);
+            for (best, error) in best.iter_mut().zip(errors) {
+                if error.norm() < best.1 {
+                    *best = (level, error.norm());
+                }
+            }
+        }
+        let squares: f64 = best.iter().map(|(_, error)| error.powi(2)).sum();
+        let changed = self.rows.iter().zip(&best);
+        let changed = changed.filter(|(row, (level, _))| column[**row].total_cmp(level).is_ne());
+        let listed =
+            changed.map(|(&row, (level, _))| format!("{level} kg in {}", table.location(row)));
+        let listed: Vec<String> = listed.collect();
+        let is_explained = (squares / self.rows.len() as f64).sqrt() < self.limit;
+        let more = listed.len().saturating_sub(MAX_LISTED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let shown = listed[..listed.len().min(MAX_LISTED)].join(", ");
+        (is_explained && listed.len() > 1)
+            .then(|| format!("they fit with other payloads: {shown}{more}"))
     }
 
     /// Returns the words for positions that belong to the joint angles of other rows of the table. A
@@ -277,7 +319,7 @@ impl MistakenRows<'_, '_> {
 
 /// Returns the rms error of the nominal arm after its registration to the `chosen` rows of
 /// `measurements` alone \[m\].
-fn registration_error(
+pub(super) fn registration_error(
     fit: &CheckedFit,
     measurements: &Measurements,
     chosen: &[usize],

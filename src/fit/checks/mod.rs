@@ -44,6 +44,8 @@ mod row_relation;
 mod row_steps;
 pub(super) mod set_aside;
 mod table_digits;
+mod turned_rows;
+mod turned_target;
 mod two_solutions;
 mod view_order;
 

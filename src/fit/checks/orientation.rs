@@ -3,9 +3,10 @@
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
-use super::convention::{IN_RADIANS, fitting_conventions};
+use super::convention::{IN_RADIANS, MAX_EXPLAINED_RATIO, fitting_conventions};
 use super::finding::{Finding, FindingCode};
 use super::priors::MAX_NOISE_FACTOR;
+use super::turned_rows::mistaken_orientations;
 
 /// Smallest root mean squared error of orientation at which another convention or frame is
 /// suspected \[rad\]: 2°.
@@ -51,7 +52,10 @@ impl Check for OrientationsFit {
                 "the measured orientations fit if the columns are read as {convention}: correct \
                  the order or the meaning of the columns"
             )),
-            None => finding,
+            None => match mistaken_orientations(fit, MAX_EXPLAINED_RATIO * rms) {
+                Some(words) => finding.with_remedy(words),
+                None => finding,
+            },
         }]
     }
 }

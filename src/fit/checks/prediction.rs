@@ -6,6 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::held_out::mistake;
 use super::row_kind::{format_error, row_noun};
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::noise::Noise;
@@ -65,7 +66,15 @@ impl Check for PredictionHolds {
             (chi2 / coordinates as f64).sqrt()
         );
         let numbers = [chi2.into(), coordinates.into(), p_value.into()];
-        vec![Finding::new(FindingCode::HeldOutBeyondPrediction, numbers, text)]
+        let finding = Finding::new(FindingCode::HeldOutBeyondPrediction, numbers, text);
+        let leading = fit.kind(fit.fitting.measurements.leading());
+        let errors = fit.fitting.position_errors(&rows, &fit.end.x);
+        vec![match mistake(fit, &leading, (&rows, &errors)) {
+            Some(words) => {
+                finding.with_remedy(format!("{words}; correct these rows, or hold out others"))
+            }
+            None => finding,
+        }]
     }
 }
 

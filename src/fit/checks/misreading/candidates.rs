@@ -66,6 +66,9 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     let is_other = |unit: &usize| !lengths(true) || POSITION_UNITS[*unit].1 != "micrometres";
     let others = (0..POSITION_UNITS.len()).filter(|_| lengths(false)).filter(is_other);
     units.extend(others.map(|unit| Misreading::PositionUnit { unit }));
+    let of_table =
+        |unit| [true, false].map(|has_targets| Misreading::TableUnit { unit, has_targets });
+    units.extend((0..POSITION_UNITS.len()).flat_map(of_table));
     let powers = if lengths(false) { [3, 1] } else { [-3, -2] };
     let of_axis = |axis: usize| powers.map(|power| Misreading::AxisUnit { axis, power });
     units.extend((0..3).flat_map(of_axis));

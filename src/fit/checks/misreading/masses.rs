@@ -3,6 +3,7 @@
 use super::Misreading;
 use super::candidates::{MASS_SCALES, of_gravity, of_hoists, of_masses, of_places};
 use super::explanation::Explanations;
+use super::payload_rows::of_payload_rows;
 use super::search::Trial;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::stages::fitting::Fitting;
@@ -21,6 +22,11 @@ impl CheckedFit<'_> {
     pub fn misread_masses(&self, limit: f64) -> &Explanations {
         self.explanations.get_or_init(|| misread_masses(self, limit, true))
     }
+}
+
+/// Returns the rms error of the fit as declared with the deviations from priors included \[m\].
+pub(in crate::fit) fn error_with_priors(fit: &CheckedFit) -> f64 {
+    Trial::new(fit).error_as_read(fit)
 }
 
 /// Finds the masses in another unit or at another place that leave at most `limit` \[m\] after a full
@@ -71,6 +77,10 @@ pub(in crate::fit) fn misread_masses(
     }
     let trial = Trial::new(fit);
     let as_read = trial.error_as_read(fit);
-    let fitted = trial.explained(&tested, limit.min(as_read).min(trial.refitted_error(fit)));
+    let limit = limit.min(as_read).min(trial.refitted_error(fit));
+    let mut fitted = trial.explained(&tested, limit);
+    if fitted.is_empty() {
+        fitted.extend(of_payload_rows(&trial, fit, limit));
+    }
     Explanations { fitted, as_read, ..Explanations::default() }
 }

@@ -14,11 +14,14 @@ mod held_places;
 mod images;
 mod known_arm;
 mod masses;
+mod payload_rows;
 mod reversed;
 mod search;
 mod some_rows;
 mod target;
 mod two_entries;
+mod two_mistakes;
+mod typed;
 mod undo;
 mod views;
 mod words;
@@ -28,7 +31,7 @@ pub(crate) use explanation::MisreadEffect;
 pub(in crate::fit) use explanation::first_of;
 pub(in crate::fit) use images::is_of_views;
 pub(crate) use known_arm::misread_table;
-pub(in crate::fit) use masses::misread_masses;
+pub(in crate::fit) use masses::{error_with_priors, misread_masses};
 pub(in crate::fit) use search::{MAX_CLEAR_RATIO, MAX_NOISE_SIGMAS};
 pub(in crate::fit) use some_rows::reading_of_rows;
 pub(in crate::fit) use views::{start_of_fit, with_readings};
@@ -258,6 +261,22 @@ pub enum Misreading {
         /// Exponent of the power of ten by which the length must be multiplied.
         power: i8,
     },
+    /// A length a or d, or an angle α of the joint table is another number.
+    Typed {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// Entry of the joint table.
+        field: JointField,
+        /// Number that must be added \[µm\], or \[m°\] for an angle.
+        by: i32,
+    },
+    /// All lengths of the joint table are in another unit, declared as millimetres.
+    TableUnit {
+        /// Index of the unit in [`POSITION_UNITS`].
+        unit: usize,
+        /// True if the targets are in this unit too.
+        has_targets: bool,
+    },
     /// The base stands elsewhere than declared, and the problem holds it there.
     HeldBase,
     /// The target lies elsewhere than declared, and the problem holds it there.
@@ -431,7 +450,8 @@ impl Misreading {
             Self::Length { joint, field, .. }
             | Self::Sign { joint, field }
             | Self::TableRadians { joint, field }
-            | Self::TableDegrees { joint, field } => (joint, 0, Some(field)),
+            | Self::TableDegrees { joint, field }
+            | Self::Typed { joint, field, .. } => (joint, 0, Some(field)),
             Self::Twist { joint, .. } => (joint, 0, Some(JointField::Alpha)),
             Self::Mass { mass, .. } => (mass, 0, None),
             Self::Hoist { is_reversed } => (usize::from(is_reversed), 0, None),

@@ -31,4 +31,15 @@ impl Trial<'_> {
         };
         errors.into_iter().filter(|(_, error)| *error <= MAX_RATIO_TO_BEST * best).min_by_key(size)
     }
+
+    /// Returns the difference between the largest and the smallest command of the joint at index
+    /// `joint` \[rad\] or \[m\].
+    pub(super) fn commanded_range(&self, joint: usize) -> f64 {
+        let commands = || {
+            let measurements = self.fitting.measurements;
+            let rows = self.fitting.split.identification.iter();
+            rows.filter_map(move |&row| measurements.configuration(row).get(joint).copied())
+        };
+        commands().fold(f64::NEG_INFINITY, f64::max) - commands().fold(f64::INFINITY, f64::min)
+    }
 }

@@ -37,6 +37,9 @@ const MAX_REACHES: f64 = 1e4;
 /// misread loads and shifted rows are searched. A joint angle that is wrong by one degree causes
 /// seven times as much.
 const MAX_REACHES_OF_LOADS: f64 = 2e-3;
+/// Smallest error of the registered nominal arm with any other misreading, as a multiple of its reach,
+/// at which other numbers in the joint table are tried.
+const MIN_REACHES_OF_TYPED: f64 = 0.01;
 /// Smallest motion of a joint over all rows, \[rad\] or \[m\], at which a fitted ratio of motion to
 /// command is a misreading. A smaller motion means that the joint does not follow its command at
 /// all.
@@ -69,7 +72,7 @@ pub(in crate::fit) const MAX_NOISE_SIGMAS: f64 = 5.0;
 pub(in crate::fit) const MAX_CLEAR_RATIO: f64 = 0.02;
 /// Relative reduction of the cost by one step below which a registration without a full fit ends.
 /// The error is then accurate enough for a comparison at [`MAX_RATIO_TO_BEST`].
-const TRIAL_TOLERANCE: f64 = 1e-4;
+pub(super) const TRIAL_TOLERANCE: f64 = 1e-4;
 /// Share of the rows with the largest errors that are excluded from rms errors if the problem has a
 /// robust loss.
 const MAX_SET_ASIDE_SHARE: f64 = 0.3;
@@ -92,8 +95,8 @@ pub(super) struct Outcome {
 /// Fit, problem and chosen rows to which misreadings are applied.
 pub(super) struct Trial<'a> {
     pub fitting: &'a Fitting<'a>,
-    problem: &'a Problem,
-    chosen: Vec<usize>,
+    pub problem: &'a Problem,
+    pub chosen: Vec<usize>,
 }
 
 /// Finds the misreadings that explain why the fit does not agree with its measurements.
@@ -152,6 +155,11 @@ pub(super) fn explanations(fit: &CheckedFit) -> Explanations {
     }
     let is_near = !near_misreadings(&errors, nominal).is_empty();
     errors.extend(trial.registered_errors(&of_two_entries(&tested, is_near)));
+    // Any other number in the joint table is only tried where no usual mistake comes near.
+    let least = errors.iter().map(|(_, error)| *error).fold(nominal, f64::min);
+    if is_position && least > MIN_REACHES_OF_TYPED * model.reach() {
+        errors.extend(trial.typed_entries(fit.problem, nominal));
+    }
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
         *shift = trial.with_best_start(*shift);
@@ -165,6 +173,9 @@ pub(super) fn explanations(fit: &CheckedFit) -> Explanations {
         explanations.as_read = trial.error_as_read(fit);
         let error = explanations.as_read.min(trial.refitted_error(fit));
         explanations.fitted = trial.fit_in_full(&errors, error);
+        if explanations.fitted.is_empty() && least > MIN_REACHES_OF_TYPED * model.reach() {
+            explanations.fitted = trial.of_two_mistakes(fit, (&tested, &errors), error);
+        }
     }
     explanations
 }
@@ -288,20 +299,22 @@ impl<'a> Trial<'a> {
             if !is_within_priors && !is_shift && rms > self.largest_usual_error() {
                 return None;
             }
-            Some(Explanation {
+            let explanation = Explanation {
                 words: misreading.described(size, self.problem) + &place + &clocks,
                 rms,
                 effect: size.and_then(|size| misreading.expressed(size)),
                 left_out: left_out?,
-            })
+            };
+            // Errors are compared in the unit of the table.
+            Some((rms / misreading.position_factor(), explanation))
         };
         let explained = parallel::map_items(chosen, explanation);
-        let mut explained: Vec<Explanation> =
-            explained.into_iter().flatten().filter(|explanation| explanation.rms < limit).collect();
-        explained.sort_by(|a, b| a.rms.total_cmp(&b.rms));
-        let best = explained.first().map_or(0.0, |explanation| explanation.rms);
-        explained.retain(|explanation| explanation.rms <= MAX_RATIO_TO_BEST * best);
-        explained
+        let mut explained: Vec<(f64, Explanation)> =
+            explained.into_iter().flatten().filter(|(_, of)| of.rms < limit).collect();
+        explained.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let best = explained.first().map_or(0.0, |(rms, _)| *rms);
+        explained.retain(|(rms, _)| *rms <= MAX_RATIO_TO_BEST * best);
+        explained.into_iter().map(|(_, explanation)| explanation).collect()
     }
 
     /// Returns the errors with a misreading corrected: those of the registered nominal arm or, if
@@ -321,6 +334,7 @@ impl<'a> Trial<'a> {
                 let spread = spread(fitting.placement, rows, |place| points[rows[place]]);
                 let is_followed = !fitting.measurements.leading().is_position()
                     || misreading == (Misreading::Reversed { joints: 0 })
+                    || misreading.typed_change().is_some()
                     || rms <= MAX_PART_OF_SPREAD * spread;
                 return (rms.is_finite() && is_followed).then_some(outcome);
             }
@@ -401,20 +415,14 @@ impl<'a> Trial<'a> {
         noise.max(MAX_REACHES_BEYOND_PRIORS * model.reach())
     }
 
-    /// Returns the difference between the largest and the smallest command of the joint at index
-    /// `joint` \[rad\] or \[m\].
-    fn commanded_range(&self, joint: usize) -> f64 {
-        let commands = || {
-            let measurements = self.fitting.measurements;
-            let rows = self.fitting.split.identification.iter();
-            rows.filter_map(move |&row| measurements.configuration(row).get(joint).copied())
-        };
-        commands().fold(f64::NEG_INFINITY, f64::max) - commands().fold(f64::INFINITY, f64::min)
-    }
-
     /// Returns the cross-validation misfit of a fit, with each configuration left out in turn.
     /// `problem` is the corrected one, which may have another number of joints.
-    fn left_out(&self, fitting: &Fitting, end: &FitEnd, problem: &Problem) -> LeftOutMisfit {
+    pub(super) fn left_out(
+        &self,
+        fitting: &Fitting,
+        end: &FitEnd,
+        problem: &Problem,
+    ) -> LeftOutMisfit {
         let whole = fitting.whole();
         let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
         let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();

@@ -55,6 +55,8 @@ impl Misreading {
                 | Self::Twist { .. }
                 | Self::ExchangedRows { .. }
                 | Self::ExchangedLengths { .. }
+                | Self::Typed { .. }
+                | Self::TableUnit { .. }
         )
     }
 
@@ -74,6 +76,20 @@ impl Misreading {
             }
             Self::Twist { joint, degrees } => {
                 problem.joints.get_mut(joint - 1)?.alpha += f64::from(degrees).to_radians();
+                return Some(problem);
+            }
+            Self::TableUnit { unit, has_targets } => {
+                let (factor, _) = POSITION_UNITS[unit];
+                let lengths = problem.joints.iter_mut().flat_map(lengths_of);
+                lengths.for_each(|length| *length *= factor);
+                if has_targets {
+                    problem.tool.target *= factor;
+                    problem.targets.iter_mut().for_each(|target| target.at *= factor);
+                }
+                return Some(problem);
+            }
+            Self::Typed { joint, field, .. } => {
+                *number_of(problem.joints.get_mut(joint - 1)?, field)? += self.typed_change()?;
                 return Some(problem);
             }
             Self::TargetInMillimetres => {}
@@ -262,6 +278,9 @@ impl Misreading {
             Self::Zero { joint, degrees } => {
                 Some((format!("joint{joint}.theta"), f64::from(degrees).to_radians() + x))
             }
+            Self::Typed { joint, field, .. } => {
+                Some((format!("joint{joint}.{}", field.name()), self.typed_change()? + x))
+            }
             _ => None,
         }
     }
@@ -279,7 +298,13 @@ impl Misreading {
             let from = self.shifted_from().unwrap_or(0);
             let source = |row: usize| {
                 let shifted = row.checked_add_signed(by.into())?;
-                if row < from { Some(row) } else { (shifted < table.len()).then_some(shifted) }
+                // The positions of the last rows before a shift to later rows belong behind it.
+                let is_taken = row < from && row.saturating_add_signed(isize::from(-by)) >= from;
+                match row {
+                    _ if is_taken => None,
+                    row if row < from => Some(row),
+                    _ => (shifted < table.len()).then_some(shifted),
+                }
             };
             let pairs = chosen.iter().filter_map(|&row| Some((row, source(row)?)));
             let (chosen, sources): (Vec<usize>, Vec<usize>) = pairs.unzip();

@@ -20,7 +20,8 @@ impl Misreading {
     /// has one. If an entry of the joint table is misread, its place in the file is added.
     pub(super) fn described(self, size: Option<f64>, problem: &Problem) -> String {
         if let Some(place) = self.place(problem).or_else(|| self.places_of_two(problem)) {
-            let words = self.lengths_of_rows(problem).unwrap_or_else(|| self.to_string());
+            let words = self.lengths_of_rows(problem).or_else(|| self.typed_words(size, problem));
+            let words = words.unwrap_or_else(|| self.to_string());
             return format!("{words} ({place})");
         }
         match (self, size) {
@@ -129,7 +130,8 @@ impl Misreading {
             Self::Sign { joint, field }
             | Self::Length { joint, field, .. }
             | Self::TableRadians { joint, field }
-            | Self::TableDegrees { joint, field } => {
+            | Self::TableDegrees { joint, field }
+            | Self::Typed { joint, field, .. } => {
                 joint.checked_sub(usize::from(is_standard && matches!(field, A | Alpha)))?
             }
             Self::Twist { joint, .. } => joint.checked_sub(usize::from(is_standard))?,
@@ -484,7 +486,7 @@ impl Misreading {
                     power_of_ten(power)
                 )
             }
-            _ => Ok(()),
+            _ => f.write_str(&self.words_of_table_unit()),
         }
     }
 }

@@ -1,0 +1,194 @@
+//! Search for two mistakes at once: two misreadings, or one misreading and some wrong rows.
+
+use super::Misreading;
+use super::explanation::Explanation;
+use super::search::{MAX_EXPLAINED_RATIO, TRIAL_TOLERANCE, Trial, near_misreadings};
+use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::stages::fitting::Fitting;
+use crate::measurement::Split;
+use crate::numeric::{median, parallel};
+use crate::problem::Problem;
+
+/// Maximum number of rows, evenly spaced, by which pairs of misreadings are ranked.
+const MAX_RANKED_ROWS: usize = 24;
+/// Maximum number of pairs that are fitted in full.
+const MAX_FITTED_PAIRS: usize = 6;
+/// Maximum number of misreadings that are tried without the rows that they leave farthest off.
+const MAX_TRIMMED: usize = 40;
+/// Share of the rows that a registration without wrong rows keeps.
+const KEPT_SHARE: f64 = 0.85;
+/// Number of registrations to the rows that fit the one before.
+const PASSES: usize = 4;
+/// Smallest ratio of the error of a wrong row to the median error with a misreading corrected.
+const MIN_WRONG_RATIO: f64 = 8.0;
+/// Maximum number of rows that the words list.
+const MAX_LISTED: usize = 4;
+
+/// Rows that are kept with a misreading corrected, by their places among the chosen ones, with the
+/// rms error of the registered nominal arm \[m\].
+struct Trimmed {
+    misreading: Misreading,
+    kept: Vec<usize>,
+    error: f64,
+}
+
+impl Misreading {
+    /// Returns true for a misreading that often comes with another one.
+    fn is_usual(self) -> bool {
+        match self {
+            Self::Reversed { joints } => joints.count_ones() == 1,
+            Self::Zero { degrees, .. } => degrees % 90 == 0,
+            Self::Mirrored { .. }
+            | Self::Exchanged { .. }
+            | Self::Degrees
+            | Self::Radians
+            | Self::MixedUnits { .. }
+            | Self::PositionUnit { unit: 0 }
+            | Self::Metres
+            | Self::Millimetres
+            | Self::StandardForm
+            | Self::ModifiedForm => true,
+            _ => false,
+        }
+    }
+}
+
+impl Trial<'_> {
+    /// Returns what explains a fit that no single misreading explains, with `error` \[m\]: one of the
+    /// `tested` misreadings where some rows are wrong too, or two of them. `errors` are those of each by
+    /// itself, in ascending order.
+    pub(super) fn of_two_mistakes(
+        &self,
+        fit: &CheckedFit,
+        (tested, errors): (&[Misreading], &[(Misreading, f64)]),
+        error: f64,
+    ) -> Vec<Explanation> {
+        // The equilibrium of beams takes a time that forbids so many trials.
+        let is_slow = fit.problem.joints.iter().any(|joint| joint.beam.is_some());
+        match self.explained_without_rows(errors) {
+            Some(explanation) => vec![explanation],
+            None if is_slow => Vec::new(),
+            None => {
+                let few = Trial::with_rows(fit, MAX_RANKED_ROWS);
+                self.explained_by_two(&few, tested, MAX_EXPLAINED_RATIO * error)
+            }
+        }
+    }
+
+    /// Returns the pairs of usual misreadings among those `tested` that leave less than `limit` \[m\]
+    /// after a full fit, best first. `few` is the same trial with fewer rows, which ranks them.
+    fn explained_by_two(&self, few: &Trial, tested: &[Misreading], limit: f64) -> Vec<Explanation> {
+        let usual: Vec<Misreading> =
+            tested.iter().copied().filter(|misreading| misreading.is_usual()).collect();
+        let places: Vec<usize> = (0..usual.len()).collect();
+        let of_first = |&place: &usize| {
+            few.with_corrected(usual[place], false, |fitting, problem| {
+                let inner = Trial::of_rows(fitting, problem, fitting.split.identification.clone());
+                let error = |second: &Misreading| {
+                    let is_other = second.group() != usual[place].group();
+                    let error = inner.outcome(*second, false).filter(|_| is_other)?.rms;
+                    Some(([usual[place], *second], error))
+                };
+                Some(usual[place + 1..].iter().filter_map(error).collect::<Vec<_>>())
+            })
+        };
+        let pairs = parallel::map_items(&places, of_first);
+        let mut pairs: Vec<([Misreading; 2], f64)> =
+            pairs.into_iter().flatten().flatten().collect();
+        pairs.sort_by(|a, b| a.1.total_cmp(&b.1));
+        pairs.truncate(MAX_FITTED_PAIRS);
+        let explained = |([first, second], _): &([Misreading; 2], f64)| {
+            let explained = self.with_corrected(*first, false, |fitting, problem| {
+                let inner = Trial::of_rows(fitting, problem, fitting.split.identification.clone());
+                inner.explained(&[*second], limit).into_iter().next()
+            })?;
+            let first = first.described(None, self.problem);
+            Some(Explanation { words: format!("{first}, and {}", explained.words), ..explained })
+        };
+        let mut explained: Vec<Explanation> = pairs.iter().filter_map(explained).collect();
+        explained.sort_by(|a, b| a.rms.total_cmp(&b.rms));
+        explained.truncate(1);
+        explained
+    }
+
+    /// Returns the misreading among the first of `errors` that explains most rows where the others
+    /// are wrong, after a full fit without these.
+    fn explained_without_rows(&self, errors: &[(Misreading, f64)]) -> Option<Explanation> {
+        let as_read = self.trimmed(Misreading::Reversed { joints: 0 })?.error;
+        let leaves_rows_out = |misreading: &Misreading| {
+            matches!(misreading, Misreading::Shifted { .. } | Misreading::TextOrder { .. })
+        };
+        let listed = errors.iter().map(|(misreading, _)| *misreading);
+        let listed = listed.filter(|misreading| !leaves_rows_out(misreading)).take(MAX_TRIMMED);
+        let trimmed = parallel::map_items(&listed.collect::<Vec<_>>(), |&misreading| {
+            self.trimmed(misreading)
+        });
+        let mut trimmed: Vec<Trimmed> = trimmed.into_iter().flatten().collect();
+        trimmed.sort_by(|a, b| a.error.total_cmp(&b.error));
+        let ranked: Vec<(Misreading, f64)> =
+            trimmed.iter().map(|of| (of.misreading, of.error)).collect();
+        let near = near_misreadings(&ranked, as_read);
+        let best = trimmed.first().filter(|of| near.contains(&of.misreading))?;
+        let wrong: Vec<usize> =
+            (0..self.chosen.len()).filter(|place| !best.kept.contains(place)).collect();
+        if wrong.is_empty() {
+            return None;
+        }
+        let kept = best.kept.iter().map(|&place| self.chosen[place]).collect();
+        let without = Trial::of_rows(self.fitting, self.problem, kept);
+        let explained = without.explained(&near, MAX_EXPLAINED_RATIO * as_read);
+        let best = explained.into_iter().next()?;
+        let table = self.fitting.measurements;
+        let listed = wrong.iter().take(MAX_LISTED);
+        let listed = listed.map(|&place| table.location(self.chosen[place]).to_string());
+        let listed: Vec<String> = listed.collect();
+        let more = wrong.len() - listed.len();
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let (noun, verb) = if wrong.len() == 1 { ("row", "is") } else { ("rows", "are") };
+        let words = format!(
+            "{}, and without the {noun} {}{more}, which {verb} wrong besides",
+            best.words,
+            listed.join(", ")
+        );
+        Some(Explanation { words, ..best })
+    }
+
+    /// Registers the nominal arm with a misreading corrected to most rows, those that it leaves
+    /// nearest, again and again.
+    fn trimmed(&self, misreading: Misreading) -> Option<Trimmed> {
+        self.with_corrected(misreading, false, |fitting, _: &Problem| {
+            let Fitting { placement, model, measurements, .. } = *fitting;
+            let rows = fitting.leading_rows();
+            let mut kept = rows.clone();
+            let mut lengths = Vec::new();
+            for _ in 0..PASSES {
+                let split = &Split { identification: kept, held_out: Vec::new() };
+                let held_out_only = placement.held_out_only(model, measurements, split);
+                let declared = fitting.with_declared_noise();
+                let x = Fitting { split, held_out_only, ..declared }
+                    .registered_to(TRIAL_TOLERANCE)
+                    .ok()?;
+                let errors = fitting.position_errors(&rows, &x);
+                lengths =
+                    rows.iter().zip(errors).map(|(&row, error)| (row, error.norm())).collect();
+                lengths.sort_by(|a: &(usize, f64), b| a.1.total_cmp(&b.1));
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a count"
+                )]
+                let count = (KEPT_SHARE * rows.len() as f64).ceil() as usize;
+                kept = lengths.iter().take(count).map(|(row, _)| *row).collect();
+                kept.sort_unstable();
+            }
+            let limit = MIN_WRONG_RATIO * median(lengths.iter().map(|(_, length)| *length))?;
+            let kept: Vec<(usize, f64)> =
+                lengths.into_iter().filter(|(_, length)| *length <= limit).collect();
+            let squares: f64 = kept.iter().map(|(_, length)| length.powi(2)).sum();
+            let error = (squares / kept.len().max(1) as f64).sqrt();
+            let mut kept: Vec<usize> = kept.into_iter().map(|(row, _)| row).collect();
+            kept.sort_unstable();
+            Some(Trimmed { misreading, kept, error })
+        })
+    }
+}
