@@ -3,6 +3,7 @@
 use super::candidates::{at_limits, candidates_drawn, few_in_view};
 use super::document::{Block, Table, code, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
+use super::identify::page_warnings;
 use super::render::Story;
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
 use crate::fit::Noise;
@@ -32,6 +33,7 @@ pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(Block::Text(verdict(options, next)));
+    blocks.push(page_warnings(&next.found, None));
     blocks.extend(
         few_in_view(next.candidates, next.drawn, options.workspace.is_some()).map(Block::Text),
     );
