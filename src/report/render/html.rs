@@ -180,6 +180,12 @@ fn block<'a>(item: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
             Block::Ranking(points) => ol { @for point in points { (list_item(point)) } },
             Block::Table(content) => (table(content)),
             Block::Headline(content) => (headline(content)),
+            Block::Outcome { word, of, is_good } => {
+                div.big { span.state {
+                    span class=(if *is_good { "now" } else { "bad" }) { (word) }
+                    span.label { (of) }
+                } }
+            },
             Block::Blanks(terms) => dl.blanks { @for term in terms { div { dt { (term) } dd {} } } },
             Block::Poses(data) => (poses::section(data)),
             Block::Figures(drawings) => (grid(drawings, figures)),
