@@ -176,6 +176,14 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         return "Not judged, because the fit to the measured poses is not to be trusted."
             .to_owned();
     }
+    if next.stop == Some(StopReason::CausesAlike) {
+        let effects = if next.effects.len() == 1 { "the effect" } else { "the effects" };
+        return format!(
+            "No pose within these ranges decides: the best {} lower the variance of {effects} listed \
+             below by less than 1 %. Other ranges of the joints, another payload or another base may.",
+            options.poses
+        );
+    }
     if options.purpose == Purpose::Causes {
         let gain: f64 = next.steps.iter().map(|step| step.gain).sum();
         let poses = counted(next.steps.len(), "pose");
