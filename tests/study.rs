@@ -310,7 +310,7 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
         &[
             "gauss-newton",
             "levenberg-marquardt",
-            "held out mean",
+            "held out mean, mm",
             "Written to out/small-study: ",
             "study.csv",
         ],

@@ -216,7 +216,10 @@ pub fn after_loop(
 ) -> String {
     let named = common.problem_arguments();
     let file = common.problem_file().display().to_string();
-    if let Some(look) = report::influential_rows_advice(fit, &common.problem_file()) {
+    let spoilt = after.has(FindingCode::ExcludedRowsFitted).then_some(after);
+    if let Some(look) =
+        report::influential_rows_advice(spoilt.unwrap_or(fit), &common.problem_file())
+    {
         return look;
     }
     if result.interrupted {

@@ -12,7 +12,7 @@ use flexcal::fit::Stop;
 #[cfg(unix)]
 const TERMINATED_STATUS: u8 = 143;
 /// Exit status after an interrupt with nothing written: 128 + SIGINT, as in shells.
-pub const INTERRUPTED_STATUS: u8 = 130;
+const INTERRUPTED_STATUS: u8 = 130;
 /// Time after an interrupt in which a command may finish by itself, so that it ends within 2 s. In
 /// builds with debug assertions, as in tests, the time is practically unlimited.
 const MAX_FINISHING_TIME: Duration =
@@ -26,6 +26,8 @@ type LastWork = Box<dyn FnOnce() -> u8 + Send>;
 static WRITE_LOCK: Mutex<()> = Mutex::new(());
 /// True once a command heeds the stop request, so that the first interrupt does not end it at once.
 static HEEDS_STOP_REQUEST: AtomicBool = AtomicBool::new(false);
+/// True once the results have their final names, so that the command is as good as done.
+static IS_WRITTEN: AtomicBool = AtomicBool::new(false);
 /// State of the running command.
 static STATE: Mutex<State> = Mutex::new(State::Running(None));
 
@@ -87,6 +89,12 @@ pub fn block_exit() -> MutexGuard<'static, ()> {
     lock(&WRITE_LOCK)
 }
 
+/// Declares that the results have their final names: the first interrupt leaves the command to end
+/// by itself. Must be called before the guard of [`block_exit`] is released.
+pub fn mark_written() {
+    IS_WRITTEN.store(true, Ordering::Relaxed);
+}
+
 /// Returns the stop request of this process.
 fn stop_request() -> &'static Stop {
     static STOP: OnceLock<Stop> = OnceLock::new();
@@ -107,6 +115,7 @@ pub fn watch() {
     // The thread that waits for interrupts inherits the blocked SIGTERM, too.
     #[cfg(unix)]
     watch_termination();
+    IS_WRITTEN.store(false, Ordering::Relaxed);
     install();
 }
 
@@ -134,14 +143,18 @@ fn watch_termination() {
 
 /// Makes the stop request, and gives a command that heeds it a limited time to end. Ends the
 /// process at once for other commands, and at the second interrupt. Waits while files get their
-/// final names.
+/// final names; a command whose files have them ends by itself.
 fn end_early(status: u8) {
-    let is_repeated = stop_request().request();
-    if !is_repeated {
+    // A command that sees the request may ask for the status at once.
+    if !stop_request().is_requested() {
         STATUS.store(status, Ordering::Relaxed);
     }
+    let is_repeated = stop_request().request();
     if is_repeated || !HEEDS_STOP_REQUEST.load(Ordering::Relaxed) {
         let _files = lock(&WRITE_LOCK);
+        if !is_repeated && IS_WRITTEN.load(Ordering::Relaxed) {
+            return;
+        }
         super::diagnostic::interrupted("interrupted before the end");
         exit(i32::from(status));
     }

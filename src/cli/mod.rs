@@ -114,7 +114,8 @@ enum Command {
 
 /// Runs the command line; `arguments` begin with the name of the program. Returns the exit status:
 /// 0 done, 1 the result is not trusted, not passed or incomplete, 2 wrong input, 3 the arm has
-/// changed since its estimate, 130 interrupted with nothing written.
+/// changed since its estimate, 130 interrupted with nothing written
+/// (143 by SIGTERM).
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = arguments.into_iter().collect();
     let cli = match Cli::try_parse_from(&words) {
@@ -168,7 +169,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             let is_interrupted = error.downcast_ref().is_some_and(IdentifyError::is_interrupted)
                 || error.downcast_ref().is_some_and(PriorError::is_interrupted)
                 || error.downcast_ref().is_some_and(NextError::is_interrupted);
-            if is_interrupted { interrupt::INTERRUPTED_STATUS } else { 2 }
+            if is_interrupted { interrupt::status() } else { 2 }
         }
     }
 }

@@ -33,7 +33,7 @@ use super::{diagnostic, interrupt, values};
     )),
     after_help = "Fits the measured poses, then chooses those that lower the error of predictions in the workspace most: the limits of the \
 joints (measured ranges where there are none), the ranges of a TRUTH.toml, or the rows of --pool. Writes next.json, the page next.html and, unless nothing more is needed, next.csv. Exit \
-status 1: further poses gain nothing and the tolerance is not met.
+status 1: further poses gain nothing and the tolerance is not met, or do not tell the causes apart.
 
 Examples:
   flexcal next my-arm --poses 10
@@ -229,7 +229,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         );
     }
     let is_met = next.error.zip(options.tolerance).is_none_or(|(error, most)| error.bound <= most);
-    let is_exhausted = next.stop == Some(StopReason::GainBelowNoise) && !is_met;
+    let is_exhausted = match next.stop {
+        Some(StopReason::GainBelowNoise) => !is_met,
+        stop => stop == Some(StopReason::CausesAlike),
+    };
     Ok(Outcome::from_trust(is_trusted && !is_exhausted))
 }
 
@@ -249,6 +252,11 @@ fn next_step(
         );
     }
     let flags = asked.flags();
+    if next.stop == Some(StopReason::CausesAlike) {
+        return "name other ranges of the joints or payloads with --truth or --pool, then this \
+                command again"
+            .to_owned();
+    }
     // More poses cannot correct a model that lacks an effect.
     let noise_exceeds = next.noise_exceeds(tolerance, level);
     // The new rows of an update are too few for a search.

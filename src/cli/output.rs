@@ -171,6 +171,7 @@ impl Results {
         }
         let exit_blocked = interrupt::block_exit();
         batch.commit(&lock, &record, &outdated).map_err(failed(self.folder.clone()))?;
+        interrupt::mark_written();
         drop((exit_blocked, lock));
         if let (Some((name, other)), false) = (replaced, self.quiet) {
             let what = if name == REPORT[0] { "the report" } else { &name };

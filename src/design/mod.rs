@@ -20,6 +20,7 @@ mod next;
 mod plan;
 mod pool;
 mod posterior;
+mod purpose;
 mod scan;
 mod sensitivity;
 mod separate;
@@ -46,8 +47,9 @@ pub use self::{
     check::{predictable_rows, random_rows},
     exchange::Exchange,
     explanations::{Explanations, rivals},
-    next::{NextError, NextOptions, NextPoses, NextStep, Purpose, StopReason, next},
+    next::{NextError, NextOptions, NextPoses, NextStep, next},
     plan::PlanProgress,
+    purpose::{Purpose, StopReason},
     sensitivity::Sensitivity,
     separate::{EffectPair, PairSeparation, separate},
     site::Site,

@@ -8,6 +8,7 @@ use super::greedy::Greedy;
 use super::misfit::Misfit;
 use super::pool::{Pool, pool_and_workspace};
 use super::posterior::posterior_rows;
+use super::purpose::{Purpose, StopReason, leaves_causes_open, stop_reason};
 use super::workspace_error::{MisfitSize, WorkspaceError};
 use super::{Candidates, Criterion, DesignError, Exchange, Sensitivity, Site, Workspace, views};
 use crate::fit::{self, FindingCode, Identification, IdentifyError, Options};
@@ -26,29 +27,6 @@ const MULTIPLICATIONS_PER_UNKNOWN: f64 = 90.0;
 const MAX_OPERATIONS: f64 = 2e12;
 /// Maximum number of entries of the matrices Jᵀ, V and T of all candidates together; 3 GB.
 const MAX_ENTRIES: f64 = 4e8;
-
-/// Aim of the next poses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Purpose {
-    /// Small errors of predictions in the workspace.
-    #[default]
-    Accuracy,
-    /// Small errors of the effects among which the loop did not decide.
-    Causes,
-    /// Both aims, with equal weight.
-    Both,
-}
-
-/// Reason to choose fewer poses than requested, or none.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StopReason {
-    /// The error bound over the workspace is not above the tolerance.
-    Enough,
-    /// The most by which more poses can lower the expected error is less than 1 σ of that error.
-    GainBelowNoise,
-    /// All candidates are measured or chosen.
-    NoCandidates,
-}
 
 /// Settings of the choice of the next poses.
 #[derive(Clone)]
@@ -320,7 +298,9 @@ pub fn next(
         view(&greedy.covariance).dot(&view(&scaled)).max(0.0)
     };
     let before = remaining_error(&greedy);
-    let stop = error.filter(|_| found.is_trusted()).and_then(|error| stop_reason(&error, options));
+    let stop = error
+        .filter(|_| found.is_trusted())
+        .and_then(|error| stop_reason(&error, options.purpose, options.tolerance));
     let mut result = NextPoses {
         poses: pool.select(&[]),
         steps: Vec::new(),
@@ -343,6 +323,13 @@ pub fn next(
     let last = measured.configuration(measured.len() - 1);
     let share = |greedy: &Greedy| if before > 0.0 { remaining_error(greedy) / before } else { 1.0 };
     let chosen = take_poses((&mut result, &mut greedy), (&pool, last), options, share)?;
+    let gain: f64 = result.steps.iter().map(|step| step.gain).sum();
+    let is_judged = result.found.is_trusted() && !chosen.is_empty();
+    if is_judged && leaves_causes_open(options.purpose, gain) {
+        result.stop = Some(StopReason::CausesAlike);
+        result.steps.clear();
+        return Ok(result);
+    }
     result.poses = pool.select(&chosen);
     Ok(result)
 }
@@ -423,21 +410,6 @@ fn correction(
     } else {
         remainder::uncertainty(found, problem, data)?.map(|fitted| fitted.alone)
     })
-}
-
-/// Returns the reason to measure no more poses: the error bound is within the tolerance, or the
-/// most that poses can lower the expected error is less than 1 σ of it. Returns `None` if there is
-/// no such reason, or if the poses are for causes alone.
-fn stop_reason(error: &WorkspaceError, options: &NextOptions) -> Option<StopReason> {
-    if options.purpose == Purpose::Causes {
-        return None;
-    }
-    if options.tolerance.is_some_and(|most| error.bound <= most) {
-        return Some(StopReason::Enough);
-    }
-    let is_below_noise =
-        options.purpose == Purpose::Accuracy && error.expected - error.least < error.expected_sigma;
-    is_below_noise.then_some(StopReason::GainBelowNoise)
 }
 
 /// Returns M with tr(C M) = mean over the poses of tr(J C Jᵀ), without poses that have no

@@ -64,7 +64,8 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
              commit; the digests below identify them."
         ))
     });
-    let mut blocks = vec![Block::Headline(head)];
+    let mut blocks: Vec<Block> = result.tolerance.iter().map(outcome).collect();
+    blocks.push(Block::Headline(head));
     if !reported.is_empty() {
         blocks.push(Block::Lines(format!("{trust}:"), reported.clone()));
     }
@@ -95,9 +96,23 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
     report(problem, "acceptance", &blocks).html
 }
 
+/// Returns the verdict on a tolerance as the head of the page.
+fn outcome<'a>(test: &TestedTolerance) -> Block<'a> {
+    let verdicts = [(Verdict::Pass, "Pass"), (Verdict::Fail, "Fail")];
+    let word = verdicts.into_iter().find(|(verdict, _)| verdict.as_str() == test.verdict);
+    let tolerance = number(test.tolerance_mm, 4);
+    let of = format!("at most {tolerance} mm at {} of the poses", percent(test.share));
+    let is_good = test.verdict == Verdict::Pass.as_str();
+    Block::Outcome { word: word.map_or("Undecided", |(_, word)| word), of, is_good }
+}
+
+/// Formats a share in percent with up to two decimals.
+fn percent(share: f64) -> String {
+    format!("{} %", (share * 1e4).round() / 100.0)
+}
+
 /// States the verdict on a tolerance and the reasons for it.
 pub fn tolerance_text(test: &TestedTolerance) -> String {
-    let percent = |share: f64| format!("{} %", (share * 1e4).round() / 100.0);
     let (share, risk) = (percent(test.share), percent(test.risk));
     let tolerance = format!("{} mm", number(test.tolerance_mm, 4));
     let [least, most] = test.share_within.map(percent);

@@ -2,7 +2,7 @@
 
 use super::document::code;
 use crate::measurement::Measurements;
-use crate::problem::Problem;
+use crate::problem::{JointKind, Problem};
 use crate::quantity::format::counted;
 
 /// Number of candidates below which a choice among drawn poses is called one of few.
@@ -47,14 +47,23 @@ pub(super) fn few_in_view(
 /// States how many poses command a joint to its limit, where controllers may refuse them; `None` if
 /// no pose does. `command` names the command that is to be repeated with other limits.
 pub(super) fn at_limits(problem: &Problem, poses: &Measurements, command: &str) -> Option<String> {
-    let is_at_limit = |pose: &usize| {
-        let joints = poses.configuration(*pose).iter().zip(&problem.joints);
+    let are_at_limit = |pose: usize, slides: bool| {
+        let joints = poses.configuration(pose).iter().zip(&problem.joints);
         joints.into_iter().any(|(q, joint)| {
             let (low, high) = joint.limits;
-            low < high && (*q <= low || *q >= high)
+            (joint.command_kind() == JointKind::Prismatic) == slides
+                && low < high
+                && (*q <= low || *q >= high)
         })
     };
-    let count = (0..poses.len()).filter(is_at_limit).count();
+    let at_limits = |slides: bool| (0..poses.len()).filter(move |&pose| are_at_limit(pose, slides));
+    let count = (0..poses.len())
+        .filter(|&pose| are_at_limit(pose, false) || are_at_limit(pose, true))
+        .count();
+    let keys = [(false, "min_deg", "max_deg"), (true, "min_m", "max_m")];
+    let keys = keys.into_iter().filter(|(slides, ..)| at_limits(*slides).next().is_some());
+    let keys: Vec<String> =
+        keys.map(|(_, low, high)| format!("{}, {}", code(low), code(high))).collect();
     let who = match count {
         1 => "1 of the poses has".to_owned(),
         _ if count == poses.len() => format!("All {count} poses have"),
@@ -63,9 +72,8 @@ pub(super) fn at_limits(problem: &Problem, poses: &Measurements, command: &str) 
     (count > 0).then(|| {
         format!(
             "{who} a joint at its limit. If the controller refuses such commands, declare limits \
-             with a margin ({}, {}) and {command} again.",
-            code("min_deg"),
-            code("max_deg")
+             with a margin ({}) and {command} again.",
+            keys.join("; ")
         )
     })
 }

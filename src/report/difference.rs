@@ -447,6 +447,7 @@ fn draw(differences: &[Difference], limit: f64) -> Option<Drawing> {
         legend: vec![("difference", ACCENT)],
         references: vec![0.0, -limit, limit],
         rows: differences.iter().filter_map(row).collect(),
+        is_logarithmic: false,
     }
     .drawing()
 }

@@ -33,6 +33,8 @@ pub(super) enum Block<'a> {
     Blanks(Vec<&'static str>),
     /// Errors and facts at the top of the page; on the page alone.
     Headline(Headline),
+    /// Large word at the top of the page, and below it what it is about; on the page alone.
+    Outcome { word: &'static str, of: String, is_good: bool },
     /// Figures side by side; on the page alone.
     Figures(Vec<Drawing>),
     /// Section on individual poses: the arm, ranges of joints, the largest residuals; on the page

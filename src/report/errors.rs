@@ -155,3 +155,5 @@ pub(super) const NOMINAL_ARM: &str = "nominal arm";
 pub(super) const DECLARED_ARM: &str = "as declared, fitted";
 /// Name of the arm of the extended problem.
 pub(super) const EXTENDED_ARM: &str = "with what was added";
+/// Name of the arm of the last fit, whose predictions a remainder corrects.
+pub(super) const CORRECTED_ARM: &str = "with the remainder";

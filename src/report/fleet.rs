@@ -63,6 +63,7 @@ fn draw_arms(fleet: &Fleet, is_judged: bool) -> Option<Drawing> {
         legend: vec![(if is_judged { "like its siblings" } else { "arm" }, INK), ("unlike", WARM)],
         references: vec![0.0],
         rows: fleet.arms.iter().filter_map(row).collect(),
+        is_logarithmic: false,
     }
     .drawing()
 }
@@ -83,6 +84,7 @@ fn draw_parameters(fleet: &Fleet) -> Option<Drawing> {
         legend: vec![("fleet, mean ± spread", ACCENT), ("data sheet, ± 1 σ", FAINT)],
         references: vec![0.0],
         rows: fleet.parameters.iter().filter_map(row).collect(),
+        is_logarithmic: false,
     }
     .drawing()
 }

@@ -172,6 +172,18 @@ fn describe_fit(found: &Identification, separator: &str) -> String {
     )
 }
 
+/// Returns what the terminal shows beside a text, for the page: why the fit is not trusted, and the
+/// warnings on the measurement files (of `plots`) and on the fit.
+pub(super) fn page_warnings<'a>(found: &Identification, plots: Option<&PlotData>) -> Block<'a> {
+    let why = format!("Warning: {}.", why_not_trusted(found));
+    let why = (!found.is_trusted()).then_some(Block::Note(why));
+    let read = plots.map_or(&[][..], |plots| &plots.warnings);
+    let points: Vec<String> =
+        read.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();
+    let warnings = (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points));
+    Block::Page(why.into_iter().chain(warnings).collect())
+}
+
 /// Returns the warnings on the measurement files and on the fit that the terminal shows, except the
 /// one that a fit is not trusted; `None` if there are none.
 pub(super) fn fit_warnings<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {

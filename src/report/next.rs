@@ -3,6 +3,7 @@
 use super::candidates::{at_limits, candidates_drawn, few_in_view};
 use super::document::{Block, Table, code, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
+use super::identify::page_warnings;
 use super::render::Story;
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
 use crate::fit::Noise;
@@ -32,6 +33,7 @@ pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(Block::Text(verdict(options, next)));
+    blocks.push(page_warnings(&next.found, None));
     blocks.extend(
         few_in_view(next.candidates, next.drawn, options.workspace.is_some()).map(Block::Text),
     );
@@ -173,6 +175,14 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     if !next.found.is_trusted() {
         return "Not judged, because the fit to the measured poses is not to be trusted."
             .to_owned();
+    }
+    if next.stop == Some(StopReason::CausesAlike) {
+        let effects = if next.effects.len() == 1 { "the effect" } else { "the effects" };
+        return format!(
+            "No pose within these ranges decides: the best {} lower the variance of {effects} listed \
+             below by less than 1 %. Other ranges of the joints, another payload or another base may.",
+            options.poses
+        );
     }
     if options.purpose == Purpose::Causes {
         let gain: f64 = next.steps.iter().map(|step| step.gain).sum();

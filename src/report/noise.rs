@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use serde_json::Value;
+
 use super::document::{Block, first_of, joined};
 use super::errors::{brief, row_noun, test_rows_word, unit, with_unit};
 use super::prior::contradiction;
@@ -301,11 +303,21 @@ pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> 
     )))
 }
 
-/// States in one line what to do about influential rows; `None` if there are none. `problem` is the
-/// path of the problem file.
+/// States in one line what to do about influential rows, or about rows that a loop excluded from the
+/// choice of effects and that spoil its fit; `None` if there are none. `problem` is the path of the
+/// problem file.
 pub fn influential_rows_advice(found: &Identification, problem: &Path) -> Option<String> {
-    let rows = found.influential_rows.as_ref()?.rows.iter();
-    let rows = joined(rows.map(|row| row.location.to_string()), MAX_SHOWN_INFLUENTIAL, ", ");
+    let rows: Vec<String> = match found.finding(FindingCode::ExcludedRowsFitted) {
+        Some(finding) => {
+            let place = |row: &Value| Some(format!("{}:{}", row["file"].as_str()?, row["line"]));
+            finding.value("rows")?.as_array()?.iter().filter_map(place).collect()
+        }
+        None => {
+            let rows = found.influential_rows.as_ref()?.rows.iter();
+            rows.map(|row| row.location.to_string()).collect()
+        }
+    };
+    let rows = joined(rows, MAX_SHOWN_INFLUENTIAL, ", ");
     Some(format!(
         "check {rows}; a section [robust] in {} would limit the influence of such rows",
         problem.display()

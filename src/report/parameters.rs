@@ -209,6 +209,7 @@ pub(super) fn against_priors(found: &Identification) -> Option<Drawing> {
         legend: vec![("estimate", ACCENT)],
         references: vec![0.0, -1.0, 1.0, -3.0, 3.0],
         rows: found.estimates.iter().filter_map(row).collect(),
+        is_logarithmic: false,
     }
     .drawing()
 }

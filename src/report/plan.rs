@@ -178,6 +178,7 @@ fn draw_gains(plan: &Plan) -> Option<Drawing> {
         legend: vec![("gain", ACCENT)],
         references: vec![1.0],
         rows: rows.collect(),
+        is_logarithmic: false,
     }
     .drawing()
 }

@@ -55,6 +55,7 @@ fn draw(comparison: &PriorComparison) -> Option<Drawing> {
         legend: vec![("new rows", INK), ("posterior", ACCENT)],
         references: vec![0.0, -1.0, 1.0],
         rows: comparison.parameters.iter().filter_map(row).collect(),
+        is_logarithmic: false,
     }
     .drawing()
 }

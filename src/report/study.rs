@@ -38,16 +38,16 @@ pub fn study(study: &Study, results: &Results) -> Story {
     let table = Table::of(
         &cells,
         &[
-            Column::number("noise mm", |(cell, _): &TimedCell| cell.position_sigma_mm.to_string()),
+            Column::number("noise, mm", |(cell, _): &TimedCell| cell.position_sigma_mm.to_string()),
             Column::number("poses", |(cell, _): &TimedCell| cell.identification_poses.to_string()),
             Column::words("strategy", |(cell, _): &TimedCell| cell.strategy.to_owned()),
             Column::words("solver", |(cell, _): &TimedCell| cell.solver.to_owned()).minor(),
             Column::number("not trusted", |(cell, _): &TimedCell| percent(Some(cell.failure_rate))),
-            Column::number("held out mean", |(cell, _): &TimedCell| {
+            Column::number("held out mean, mm", |(cell, _): &TimedCell| {
                 shown(cell.held_out_mm.mean, 4)
             }),
             Column::number("rms, mm", |(cell, _): &TimedCell| shown(cell.held_out_mm.rms, 4)),
-            Column::number("± sd", |(cell, _): &TimedCell| shown(cell.held_out_mm.rms_sd, 4))
+            Column::number("± sd, mm", |(cell, _): &TimedCell| shown(cell.held_out_mm.rms_sd, 4))
                 .minor(),
             Column::number("covered", |(cell, _): &TimedCell| percent(cell.coverage)),
             Column::number("largest bias", |cell| shown(bias(cell), 2)).minor(),
@@ -125,7 +125,7 @@ fn draw_errors(cells: &[TimedCell]) -> Option<Drawing> {
         Some((name(cell), vec![Some((rms, cell.held_out_mm.rms_sd.unwrap_or_default()))]))
     };
     let caption = "Root mean square error at held-out poses, noise included, with the standard deviation over the fits of the \
-                   cell. A cell is one combination of noise level (1 σ), number of poses, strategy \
+                   cell, on a logarithmic scale. A cell is one combination of noise level (1 σ), number of poses, strategy \
                    and solver.";
     Forest {
         names: ("study-errors", "Held-out error of each cell"),
@@ -134,6 +134,7 @@ fn draw_errors(cells: &[TimedCell]) -> Option<Drawing> {
         legend: vec![("rms", INK)],
         references: Vec::new(),
         rows: cells.iter().filter_map(row).collect(),
+        is_logarithmic: true,
     }
     .drawing()
 }

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::detection::has_no_mass;
 use super::document::{Block, MIN_PROBABLE, Point, joined, opening, percent};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
+use super::identify::page_warnings;
 use super::noise::format_chi2;
 use super::render::Story;
 use super::unexplained::missing_sigma;
@@ -34,6 +35,7 @@ pub fn trace(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Stor
     let result = TraceResult::new(problem, trace);
     let mut blocks = opening(&problem.title, headline(&trace.fit)).to_vec();
     blocks.push(Block::Text(verdict(&result)));
+    blocks.push(page_warnings(&trace.fit, plots));
     blocks.extend(missing_sigma(&trace.fit).map(Block::Text));
     // Beside a fit that is not to be trusted, explanations are of its mistake.
     if result.trusted {

@@ -42,8 +42,8 @@ pub struct NextResult {
     pub attainable_mm: Option<f64>,
     /// True if no number of poses can be expected to bring the error bound within the tolerance.
     pub out_of_reach: bool,
-    /// Reason for which fewer poses are named than requested: `enough`, `gain-below-noise` or
-    /// `no-candidates`; null if there is none.
+    /// Reason for which fewer poses are named than requested: `enough`, `gain-below-noise`,
+    /// `no-candidates` or `causes-alike`; null if there is none.
     pub stop: Option<&'static str>,
     /// Number of these poses after which the bound is expected to be within the tolerance; null if
     /// there are too few, or without a tolerance.
@@ -114,6 +114,7 @@ impl NextResult {
                 StopReason::Enough => "enough",
                 StopReason::GainBelowNoise => "gain-below-noise",
                 StopReason::NoCandidates => "no-candidates",
+                StopReason::CausesAlike => "causes-alike",
             }),
             enough_after: next.enough_after(options.tolerance),
             effects: next.effects.clone(),

@@ -45,8 +45,10 @@ struct Parameter<'a> {
 impl Simulation {
     /// Returns the text of `measurements.csv`.
     pub fn csv(&self) -> String {
+        let kinds: Vec<&Kind> = self.kinds().collect();
+        let columns = (self.names_targets(), kinds.as_slice());
         let rows = self.pose_numbers().into_iter().zip(&self.rows);
-        csv(self.header(), rows.map(|(pose, row)| self.cells(pose, row)))
+        csv(self.header(columns), rows.map(|(pose, row)| self.cells(pose, row, columns)))
     }
 
     /// Returns the number of the pose of each row, from 1. The rows of all points of one image have
@@ -86,8 +88,9 @@ impl Simulation {
         self.rows.iter().any(|row| !row.target.is_empty())
     }
 
-    /// Returns the column names of `measurements.csv`.
-    fn header(&self) -> Vec<String> {
+    /// Returns the column names of `measurements.csv`; there is a column of targets if
+    /// `names_targets`, and there are columns of each of the `kinds`.
+    fn header(&self, (names_targets, kinds): (bool, &[&Kind])) -> Vec<String> {
         let first = self.rows.first().map(|row| row.conditions.clone()).unwrap_or_default();
         let mut names = vec!["pose".to_owned(), self.split_column.clone()];
         let unit = |turns| if turns { "deg" } else { "m" };
@@ -101,8 +104,8 @@ impl Simulation {
             (first.temperature.is_some(), "temperature_C"),
             (true, "time_s"),
         ];
-        names.extend(self.names_targets().then(|| "target".to_owned()));
-        for kind in self.kinds() {
+        names.extend(names_targets.then(|| "target".to_owned()));
+        for kind in kinds {
             names.extend(kind.references().map(|field| field.name.to_owned()));
             let suffix = kind.unit.in_tables().suffix;
             names.extend(measured(kind).map(|field| format!("{}_{suffix}", field.name)));
@@ -118,7 +121,12 @@ impl Simulation {
     }
 
     /// Returns the cells of a row in the order of the header; `pose` is the number of its pose.
-    fn cells(&self, pose: usize, row: &Row) -> Vec<String> {
+    fn cells(
+        &self,
+        pose: usize,
+        row: &Row,
+        (names_targets, kinds): (bool, &[&Kind]),
+    ) -> Vec<String> {
         let conditions = &row.conditions;
         let split = if row.held_out { "validation" } else { "identification" };
         let mut cells = vec![pose.to_string(), split.to_owned()];
@@ -128,8 +136,8 @@ impl Simulation {
                 q => format!("{q:.9}"),
             }
         }));
-        cells.extend(self.names_targets().then(|| row.target.clone()));
-        self.push_measured_cells(row, &mut cells);
+        cells.extend(names_targets.then(|| row.target.clone()));
+        self.push_measured_cells(row, kinds, &mut cells);
         let turn =
             row.orientation.map(|orientation| orientation.scaled_axis().map(f64::to_degrees));
         let has_orientations = self.truth.orientation_sigma.is_some();
@@ -155,10 +163,10 @@ impl Simulation {
         kinds().filter(|kind| self.rows.iter().any(|row| row.observation.kind() == kind.name))
     }
 
-    /// Appends the measured values of a row to `cells`. The columns of other kinds of rows in the
-    /// table get empty cells.
-    fn push_measured_cells(&self, row: &Row, cells: &mut Vec<String>) {
-        for kind in self.kinds() {
+    /// Appends the measured values of a row to `cells`. The columns of the other `kinds` of rows in
+    /// the table get empty cells.
+    fn push_measured_cells(&self, row: &Row, kinds: &[&Kind], cells: &mut Vec<String>) {
+        for kind in kinds {
             let is_of_kind = row.observation.kind() == kind.name;
             let cell = |text: String| if is_of_kind { text } else { String::new() };
             for field in kind.references() {

@@ -8,7 +8,12 @@ const DATA: &str = "a-none.csv";
 
 /// Adds an error to x in one line of the data [mm].
 fn spoil(folder: &Folder, spoiled: usize, by: f64) {
-    let place = folder.table(DATA).place("x_mm");
+    spoil_column(folder, "x_mm", spoiled, by);
+}
+
+/// Adds an error to the cell of one line and column of the data.
+fn spoil_column(folder: &Folder, column: &str, spoiled: usize, by: f64) {
+    let place = folder.table(DATA).place(column);
     folder.map_rows(DATA, |line, row| {
         let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
         if line == spoiled {
@@ -55,6 +60,25 @@ fn a_row_that_carries_the_misfit_is_named_and_to_be_looked_at() {
     let (out, json) = identify(&folder);
     assert!(json["misfit_carried_by"].is_null() && !out.contains("causes most"), "{out}");
     assert!(out.contains("the model explains the data"), "{out}");
+}
+
+#[test]
+fn a_cause_is_not_stated_while_a_gross_error_counts_in_the_fit() {
+    let folder = Folder::new();
+    folder.copy("problems/lunar-sampler/problem.toml", "problem.toml");
+    folder.copy("problems/lunar-sampler/measurements.csv", DATA);
+    spoil_column(&folder, "z_mm", 19, 4.0);
+    let run = folder.flexcal(&format!("loop . --data {DATA} --out out")).code(1);
+    let json = folder.json("out/loop.json");
+    assert_eq!((&json["verdict"], &json["trusted"]), (&json!("unexplained"), &json!(false)));
+    assert!(items(&json["effects"]).iter().all(|effect| effect["status"] != "found"), "{json}");
+    let finding = entry(&json["findings"], |of| of["code"] == "excluded-rows-fitted");
+    assert_eq!(items(&finding["numbers"]["rows"])[0]["line"], 19);
+    assert_contains(
+        &run.words(),
+        &["No cause is claimed", "Next: check a-none.csv:19; a section [robust] in ./problem.toml"],
+    );
+    assert_contains(&folder.read("out/report.html"), &["counts in full in the fit"]);
 }
 
 #[test]

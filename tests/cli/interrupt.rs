@@ -183,6 +183,12 @@ fn every_command_says_that_it_was_interrupted() {
         assert_contains(&shown, &["error", "interrupted before the end"]);
         assert!(!folder.has("early"));
     }
+    let mut run = Terminal::run(&folder.path(""), "next . --data data.csv --out early");
+    run.wait_for_handler();
+    run.signal("TERM");
+    let (status, shown) = run.end();
+    assert_eq!(status, Some(143), "{shown}");
+    assert!(!folder.has("early"));
 }
 
 #[cfg(target_os = "linux")]

@@ -85,6 +85,7 @@ fn accept_tests_a_tolerance() {
     assert_eq!((&tested["poses"], &tested["beyond"]), (&passed["poses"], &0.into()));
     let page = std::fs::read_to_string(out.join("acceptance.html")).unwrap();
     assert!(page.contains("Pass: at least 50 % of the poses err by no more than 100"));
+    assert!(page.contains(">Pass</span><span class=\"label\">at most 100"));
     let (status, failed) = accepted("--tolerance-mm 0.0001", out);
     assert_eq!((status, &failed["tolerance"]["verdict"]), (Some(1), &"fail".into()));
     let (status, open) = accepted("--tolerance-mm 100 --share 0.999 --risk 0.05", out);

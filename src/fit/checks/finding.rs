@@ -212,6 +212,10 @@ finding_codes! {
          them free it falls by three quarters of what exceeds noise, and beyond chance (F test, \
          probability below 0.0001).",
         "free them in [parameters] (\"camera*.f*\" = { free = true } …), or declare better ones";
+    ExcludedRowsFitted: Error "excluded-rows-fitted" ["rows", "of", "reduced_chi2"]
+        "Rows that a loop excluded from the choice of effects count in full in its last fit, whose \
+         χ²/ν is larger than noise explains.",
+        "correct these rows or leave them out, or limit their influence with a section [robust]";
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide \
          part of the result.",

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::prelude::*;
 use crate::fit::{ErrorsBefore, Procedure};
-use crate::report::errors::{DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
+use crate::report::errors::{CORRECTED_ARM, DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
 use crate::results::{Stage, StageErrors, procedure_stages};
 
 /// Maximum number of poses that the figure shows.
@@ -23,6 +23,7 @@ fn stage_name(stage: Stage) -> &'static str {
         Stage::Identified => "identified",
         Stage::Declared => DECLARED_ARM,
         Stage::Closed => EXTENDED_ARM,
+        Stage::Corrected => CORRECTED_ARM,
     }
 }
 

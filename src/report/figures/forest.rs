@@ -26,6 +26,8 @@ pub struct Forest<'a> {
     /// Values at which vertical lines are drawn; the first one is the reference of all rows.
     pub references: Vec<f64>,
     pub rows: Vec<Row>,
+    /// True for a logarithmic axis; all values are then positive.
+    pub is_logarithmic: bool,
 }
 
 impl Forest<'_> {
@@ -43,8 +45,12 @@ impl Forest<'_> {
         kept.sort_unstable();
         let shown: Vec<&Row> = kept.iter().map(|&k| &self.rows[k]).collect();
         let values = || shown.iter().flat_map(|row| row.1.iter().flatten());
+        // On a logarithmic axis an interval that reaches 0 ends at the smallest value.
+        let least = values().map(|value| value.0).filter(|value| *value > 0.0);
+        let least = least.fold(f64::INFINITY, f64::min);
+        let along = |value: f64| if self.is_logarithmic { value.max(least).log10() } else { value };
         let ends = values().flat_map(|(value, error)| [value - error, value + error]);
-        let (low, high) = range(ends.chain(self.references.iter().copied()));
+        let (low, high) = range(ends.chain(self.references.iter().copied()).map(along));
         if shown.is_empty() || !(low.is_finite() && high.is_finite()) {
             return None;
         }
@@ -55,17 +61,18 @@ impl Forest<'_> {
                 let row = k as f64 + MARK_SPACING * (of as f64 - 0.5 * (count - 1.0));
                 let drawn = value.iter().filter(|(value, error)| (value + error).is_finite());
                 drawn.flat_map(move |&(value, error)| {
-                    let interval = [(value - error, row), (value + error, row)];
-                    let dot = Shape::dot((value, row), 3.2, Paint::fill(colour), None);
+                    let interval = [value - error, value + error].map(|end| (along(end), row));
+                    let dot = Shape::dot((along(value), row), 3.2, Paint::fill(colour), None);
                     [Shape::line(interval, Paint::line(colour, 1.6)), dot]
                 })
             })
         });
-        let x = Axis::linear(with_margin((low, high), 0.04), self.label, 5);
+        let axis = if self.is_logarithmic { Axis::logarithmic } else { Axis::linear };
+        let x = axis(with_margin((low, high), 0.04), self.label, 5);
         let names = shown.iter().map(|row| (row.0.clone(), INK));
         let panel = Panel::of_rows(22.0, (MAX_NAME_SPACE, 20.0), x, names);
         let panel =
-            self.references.iter().fold(panel, |panel, at| panel.with_reference(*at, FAINT));
+            self.references.iter().fold(panel, |panel, at| panel.with_reference(along(*at), FAINT));
         let legend: Vec<_> =
             self.legend.iter().map(|&(name, colour)| (name, colour, Mark::Dot)).collect();
         let legend = if legend.len() > 1 { legend.as_slice() } else { &[] };

@@ -7,6 +7,11 @@ use crate::results::CommandedJoint;
 /// Number of equal ranges into which the commands of a joint are divided.
 const COMMAND_RANGES: usize = 12;
 
+/// Largest space for the name of a joint and its lowest command in displayed pixels.
+const MAX_NAME_SPACE: f64 = 140.0;
+/// Space between the boxes and the highest command in displayed pixels.
+const LABEL_GAP: f64 = 6.0;
+
 /// Range of a joint's commands, with the residuals of the poses in it.
 struct JointRange {
     /// Lowest and highest command \[rad\] or \[m\].
@@ -64,7 +69,12 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     let names = joints.iter().map(|(command, ranges)| {
         (format!("{}   {}", command.name(), end(*command, ranges[0].ends.0)), INK)
     });
-    let shapes = joints.iter().enumerate().flat_map(|(row, (command, ranges))| {
+    let last = |(command, ranges): &(CommandedJoint, Vec<JointRange>)| {
+        end(*command, ranges[COMMAND_RANGES - 1].ends.1)
+    };
+    let longest = joints.iter().map(|joint| text_width(&last(joint))).fold(0.0, f64::max);
+    let shapes = joints.iter().enumerate().flat_map(|(row, joint)| {
+        let (command, ranges) = joint;
         let row = row as f64;
         let boxes = ranges.iter().enumerate().map(move |(k, part)| {
             let [low, high] = [part.ends.0, part.ends.1].map(|end| end * command.factor());
@@ -79,11 +89,11 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
             );
             Shape::Box { corners, paint, tag }
         });
-        let last = end(*command, ranges[COMMAND_RANGES - 1].ends.1);
-        boxes.chain([Shape::text((COMMAND_RANGES as f64, row), 6.0, last, MUTED)])
+        boxes.chain([Shape::text((COMMAND_RANGES as f64, row), LABEL_GAP, last(joint), MUTED)])
     });
-    let panel = Panel::of_rows(26.0, (92.0, 52.0), Axis::bare((0.0, COMMAND_RANGES as f64)), names)
-        .with(shapes);
+    let sides = (MAX_NAME_SPACE, LABEL_GAP + longest);
+    let panel =
+        Panel::of_rows(26.0, sides, Axis::bare((0.0, COMMAND_RANGES as f64)), names).with(shapes);
     let caption = format!(
         "Root mean square residual over the poses in which a joint is in one twelfth of its \
          measured range: {scale}; an empty box has no pose. A change along a row \

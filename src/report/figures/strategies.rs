@@ -9,6 +9,10 @@ use crate::select::{ClosedLoop, Round};
 /// Largest difference of the common logarithms of two errors at which both are marked as best.
 const MAX_TIE_DIFFERENCE: f64 = 1e-4;
 
+/// Number of characters of the name of an effect above which a figure shows the kind of the effect
+/// alone.
+const MAX_EFFECT_NAME: usize = 26;
+
 /// Row of a figure: name and errors of one fit, or of several fits with equal errors.
 struct Entry {
     strategy: String,
@@ -150,8 +154,14 @@ fn draw_entries(
 /// Returns the label of round `k` (from 0): its number from 1, and the effects that it added, or
 /// the number that it removed.
 fn round_name(closure: &ClosedLoop, k: usize) -> String {
-    let named =
-        |effect: &Effect| format!("{} {}", effect.name(), effect.place()).trim_end().to_owned();
+    let named = |effect: &Effect| {
+        let name = format!("{} {}", effect.name(), effect.place());
+        match effect {
+            _ if name.chars().count() <= MAX_EFFECT_NAME => name.trim_end().to_owned(),
+            Effect::Law(law) => format!("a law of {}", law.site()),
+            _ => effect.name().to_owned(),
+        }
+    };
     let (added, removed) = closure.changes_of_round(k);
     let change = match (added.as_slice(), removed.as_slice()) {
         ([], []) => "no change".to_owned(),

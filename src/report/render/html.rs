@@ -180,6 +180,12 @@ fn block<'a>(item: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
             Block::Ranking(points) => ol { @for point in points { (list_item(point)) } },
             Block::Table(content) => (table(content)),
             Block::Headline(content) => (headline(content)),
+            Block::Outcome { word, of, is_good } => {
+                div.big { span.state {
+                    span class=(if *is_good { "now" } else { "bad" }) { (word) }
+                    span.label { (of) }
+                } }
+            },
             Block::Blanks(terms) => dl.blanks { @for term in terms { div { dt { (term) } dd {} } } },
             Block::Poses(data) => (poses::section(data)),
             Block::Figures(drawings) => (grid(drawings, figures)),
@@ -292,7 +298,10 @@ fn headline(headline: &Headline) -> Markup {
 
 /// Renders a table with its notes above it.
 fn table(table: &Table) -> Markup {
+    // On narrow pages the unit stands behind the name, because the numbers fill the width.
+    let unit = table.header.iter().position(|head| head == "unit").filter(|&k| k > 0);
     let class = |k: usize| match (table.left.contains(&k), table.minor.contains(&k)) {
+        (true, _) if unit == Some(k) => Some("l wide"),
         (true, true) => Some("l o"),
         (true, false) => Some("l"),
         (false, true) => Some("o"),
@@ -333,7 +342,12 @@ fn table(table: &Table) -> Markup {
             } }
             tbody {
                 @for (index, row) in table.rows.iter().enumerate() { tr {
-                    @for (k, text) in row.iter().enumerate() { td class=[classes(k, text)] { (words(&cell(k, text))) } }
+                    @for (k, text) in row.iter().enumerate() { td class=[classes(k, text)] {
+                        (words(&cell(k, text)))
+                        @if let Some(unit) = unit.and_then(|unit| row.get(unit)).filter(|unit| k == 0 && !unit.is_empty()) {
+                            span.narrow { " [" (unit) "]" }
+                        }
+                    } }
                     @if let Some((_, bars)) = bars { td.l.wide { (bar(&bars[index])) } }
                 } }
             }

@@ -78,6 +78,7 @@ pub(super) fn text_blocks<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>>
         match block {
             Block::Words(inner) => shown.extend(text_blocks(inner)),
             Block::Headline(_)
+            | Block::Outcome { .. }
             | Block::Blanks(_)
             | Block::Figures(_)
             | Block::Poses(_)

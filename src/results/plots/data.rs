@@ -45,6 +45,8 @@ pub enum Stage {
     Declared,
     /// Arm identified with the effects that the loop found.
     Closed,
+    /// Arm of the last fit, whose predictions a remainder corrects.
+    Corrected,
 }
 
 /// Errors of the arm at one stage.
@@ -156,11 +158,13 @@ impl PlotData {
             poses.arm(&problem.positions_alone(), fit)?,
             poses.arm(&closure.closed, &closure.after)?,
         );
-        let stages = vec![
+        let mut stages = vec![
             registered_errors(&poses, &before, fit),
             stage_errors(&poses, Stage::Declared, &before),
-            stage_errors(&poses, Stage::Closed, &after),
         ];
+        if !closure.effects.is_empty() {
+            stages.push(stage_errors(&poses, Stage::Closed, &after));
+        }
         let residuals = poses.errors(&after, &poses.row_indices());
         let coordinates = if closure.effects.is_empty() {
             Vec::new()
@@ -274,8 +278,8 @@ impl PlotData {
         }
     }
 
-    /// Adds the error bounds of predictions over the workspace, and the joint errors that a
-    /// remainder corrects.
+    /// Adds the error bounds of predictions over the workspace, and with a remainder the joint errors
+    /// that it corrects and the held-out errors with it.
     ///
     /// # Errors
     /// Returns an error if problem and data do not match.
@@ -287,7 +291,12 @@ impl PlotData {
         fitted: &Fitted,
     ) -> Result<Self, IdentifyError> {
         let uncertainty = Uncertainty::of((identification, problem), data, fitted)?;
-        Ok(Self { uncertainty: Some(uncertainty), ..self })
+        let corrected = fitted.residuals.as_ref().map(|corrected| StageErrors {
+            stage: Stage::Corrected,
+            errors: self.held_out().iter().map(|&row| corrected.rows[row].position).collect(),
+        });
+        let stages = self.stages.iter().cloned().chain(corrected).collect();
+        Ok(Self { uncertainty: Some(uncertainty), stages, ..self })
     }
 
     /// Returns the number of rows whose residual is a length.

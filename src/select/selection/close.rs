@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
+use super::excluded_rows::excluded_rows_finding;
 use super::found::{Found, found};
 use super::gravity::other_gravity;
 use super::misread_effect::with_misread_effect;
@@ -199,10 +200,22 @@ pub fn close_by(
     if unexplained.is_empty() {
         unexplained.extend(unexplained::unlocated(&residual_tests));
     }
-    let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
+    let rows = data.evidence_rows();
+    let supporting_alone =
+        evidence.iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
+    let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(supporting_alone).collect();
+    let set_aside: Vec<Location> =
+        aside.into_iter().map(|row| data.measurements.location(row)).collect();
     let contradicted = [FindingCode::HeldOutBeyondPrediction, FindingCode::RowsSetAside];
     let is_noise =
         unexplained.is_empty() && !contradicted.iter().any(|code| fitted.found.has(*code));
+    let excluded = excluded_rows_finding(&fitted.found, &set_aside)
+        .filter(|_| is_noise && !effects.is_empty());
+    if excluded.is_some() {
+        effects.iter_mut().for_each(|found| found.status = found.status.max(Status::Probable));
+    }
+    let is_noise = is_noise && excluded.is_none();
+    let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
     let is_noise_with_found =
         is_noise && with_found.as_ref().is_none_or(|sure| !check_fit(sure, &data).is_structured());
     let verdict = Verdict::of(&statuses, is_noise, is_noise_with_found);
@@ -219,14 +232,14 @@ pub fn close_by(
             && !problem.data.fits_orientation
             && !statuses.contains(&Status::Contradicted)
             && state.misread.is_none()
+            && excluded.is_none()
     });
     let found_alone = replaceable.map(|sure| FoundAlone::new(sure, &data, gain_of(sure)));
-    let with_found = with_found.map_or(fitted.found.fitted, |sure| sure.found.fitted);
-    let rows = data.evidence_rows();
-    let supporting_alone =
-        evidence.iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
-    let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(supporting_alone).collect();
-    let set_aside = aside.into_iter().map(|row| data.measurements.location(row)).collect();
+    let with_found = match with_found {
+        _ if excluded.is_some() => declared.found.fitted,
+        Some(sure) => sure.found.fitted,
+        None => fitted.found.fitted,
+    };
     let has_gear = state.added(&fitted).iter().any(is_periodic_of_many_orders);
     let misread =
         state.misread.as_ref().filter(|misread| state.added(&fitted).contains(&misread.effect));
@@ -236,11 +249,12 @@ pub fn close_by(
     let orientations = orientation_finding(&with_orientations, &data, &unstoppable);
     // A formula may fit an arm that gives way under another gravity as well.
     let has_formula = state.added(&fitted).iter().any(Effect::is_composed);
-    let is_open = (verdict == Verdict::Unexplained || has_formula) && !interrupted;
+    let is_open =
+        (verdict == Verdict::Unexplained || has_formula) && !interrupted && excluded.is_none();
     let gravity = is_open.then(|| other_gravity(&state, &declared, &fitted)).flatten();
     let verdict = if gravity.is_some() { locate_composed(&mut effects) } else { verdict };
     let mut after = fitted.found;
-    after.findings.splice(0..0, orientations.into_iter().chain(gravity));
+    after.findings.splice(0..0, orientations.into_iter().chain(gravity).chain(excluded));
     if !interrupted {
         after.findings.iter_mut().for_each(Finding::set_remedy_after_loop);
     }

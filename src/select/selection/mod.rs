@@ -9,10 +9,12 @@
 //! - `remainder`: corrects what no sure law explains.
 //! - `misread_effect`: the effect that expresses a misread table, with which the search begins.
 //! - `gravity`: another direction of gravity that would explain what no law does.
+//! - `excluded_rows`: rows with gross errors that spoil the last fit.
 //! - `found`: the claims about each effect, compared with plainer causes that together do the same.
 //! - `status`: the status of each effect, and the verdict.
 
 mod close;
+mod excluded_rows;
 mod found;
 mod gears;
 mod gravity;

@@ -71,7 +71,8 @@ pub fn of(
     let longest = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
     let point = |k: usize| Point {
         x: view.x[k],
-        y: change_along(&view.levers[k], &partial[k]),
+        // A large displacement is no multiple of the lever; the law holds it exactly.
+        y: (view.law)(view.x[k]) + change_along(&view.levers[k], &residuals[k]),
         held_out: poses.split.held_out.binary_search(&k).is_ok(),
         row: Some(k),
     };
