@@ -81,5 +81,5 @@ pub(in crate::fit) fn distance_zero(
 
 /// Returns true for a distance to the fixture with the index `anchor`.
 fn is_distance_to(observation: Observation, anchor: usize) -> bool {
-    matches!(observation, Observation::Distance(of) if of as usize == anchor)
+    matches!(observation, Observation::Distance(of) if of == anchor)
 }
