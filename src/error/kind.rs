@@ -8,8 +8,8 @@ use thiserror::Error;
 use super::NoRows;
 use super::near::{is_it_rather, key_suggestion, pattern_suggestion, suggestion};
 use super::phrases::{
-    behind_camera_remedy, decimal_comma_hint, joined_list, missed, near_quote, plural, renumbered,
-    stiffness_units, windows_path_hint, with_remedy,
+    behind_camera_remedy, decimal_comma_hint, joined_list, missed, near_quote, path_hint, plural,
+    renumbered, stiffness_units, with_remedy,
 };
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
@@ -37,7 +37,7 @@ pub enum InputErrorKind {
         "no such file: {}; paths in `files` are relative to the problem's folder{}; before \
          anything is measured, flexcal plan chooses poses",
         path.display(),
-        windows_path_hint(path)
+        path_hint(path)
     )]
     DataFileMissing { path: PathBuf },
     #[error("no such file; paths on the command line are relative to the current folder")]
@@ -119,7 +119,10 @@ pub enum InputErrorKind {
     NotPositive { value: f64 },
     #[error("{value} is not above zero; for a rigid part leave the key out")]
     StiffnessNotPositive { value: f64 },
-    #[error("{value} is not between 0 and 1")]
+    #[error(
+        "{value} is not between 0 and 1{}",
+        if (1.0..=100.0).contains(value) { "; write 0.3 for 30 %" } else { "" }
+    )]
     NotAFraction { value: f64 },
     #[error("[0, 0, 0] has no direction; write a vector that is not zero")]
     NoDirection,

@@ -25,9 +25,16 @@ pub(super) fn with_remedy(remedy: Option<&str>) -> String {
     remedy.map_or_else(String::new, |remedy| format!("; {remedy}"))
 }
 
-/// Returns the hint that a path is an absolute one of Windows, or an empty text.
-pub(super) fn windows_path_hint(path: &Path) -> &'static str {
+/// Returns the hint that a path is a pattern, an address, or an absolute one of Windows; otherwise
+/// an empty text.
+pub(super) fn path_hint(path: &Path) -> &'static str {
     let text = path.to_string_lossy();
+    if text.contains(['*', '?']) {
+        return "; a name is no pattern, so list each file by its name";
+    }
+    if text.contains("file:/") || text.contains("http:/") || text.contains("https:/") {
+        return "; an address names no file, so write a path without it";
+    }
     let has_drive = text.split('/').any(|part| {
         let drive = part.strip_suffix(':').unwrap_or_default();
         drive.len() == 1 && drive.starts_with(|letter: char| letter.is_ascii_alphabetic())

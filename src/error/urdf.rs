@@ -119,13 +119,14 @@ pub enum UrdfErrorKind {
     OtherRobot { link: String, problem: String, robot: String },
     #[error(
         "no joint moves between \"{base}\" and \"{tip}\"{}",
-        match (base == tip, ends.is_empty()) {
-            (true, true) => "; the file holds this link alone: take that of the arm".to_owned(),
-            (true, false) => format!("; name a link farther out as --tip: {}", ends.join(", ")),
-            (false, _) => String::new(),
+        match (base == tip, ends.is_empty(), *links) {
+            (true, true, 1) => "; the file holds this link alone: take that of the arm".to_owned(),
+            (true, true, _) => "; base and tip are one link: name another one".to_owned(),
+            (true, false, _) => format!("; name a link farther out as --tip: {}", ends.join(", ")),
+            (false, ..) => String::new(),
         }
     )]
-    NothingMoves { base: String, tip: String, ends: Vec<String> },
+    NothingMoves { base: String, tip: String, ends: Vec<String>, links: usize },
     #[error("the chain has {found} joints; at most {most}")]
     TooManyJoints { found: usize, most: usize },
     #[error(
@@ -197,6 +198,12 @@ fn written_numbers(text: &str, count: usize) -> String {
     if let Some(numbers) = spaced {
         return format!("; separate numbers by spaces alone: \"{numbers}\"");
     }
-    let points = numbers(&plain.replace(',', "."));
-    points.map_or_else(String::new, |numbers| format!("; write decimal points: \"{numbers}\""))
+    if let Some(numbers) = numbers(&plain.replace(',', ".")) {
+        return format!("; write decimal points: \"{numbers}\"");
+    }
+    let is_unit = |c: char| c.is_alphabetic() || c == '°';
+    let words: Vec<&str> =
+        plain.split_whitespace().map(|word| word.trim_end_matches(is_unit)).collect();
+    let have_units = words.join(" ") != plain && numbers(&words.join(" ")).is_some();
+    if have_units { "; write metres and radians, without units".to_owned() } else { String::new() }
 }

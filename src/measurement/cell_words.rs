@@ -4,8 +4,10 @@ use super::latin::parsed;
 use crate::error::{TableErrorKind, shortened};
 
 /// Units that tables of other programs write into cells.
-pub(super) const UNITS: [&str; 12] =
-    ["degrees", "degree", "deg", "°C", "°", "rad", "mm", "kg", "m", "s", "N", "C"];
+pub(super) const UNITS: [&str; 18] = [
+    "degrees", "degree", "deg", "°C", "°", "rad", "mm", "cm", "µm", "kg", "m", "ms", "s", "kN",
+    "N", "C", "px", "%",
+];
 
 /// Months and their abbreviations in English, German and French, as spreadsheets write them.
 const MONTHS: &str = "jan feb mar apr may jun jul aug sep sept oct nov dec january february march april \
@@ -45,6 +47,9 @@ fn decorated(word: &str) -> Option<(String, &'static str, bool)> {
             "begins with an apostrophe, by which a spreadsheet marks text",
             false,
         ));
+    }
+    if let Some(number) = word.strip_prefix(['~', '≈', '<', '>']).and_then(of) {
+        return Some((number, "has a sign of comparison before it", false));
     }
     if let Some((number, _)) = word.split_once(['±']) {
         return of(number).map(|number| (number, "has an uncertainty", false));

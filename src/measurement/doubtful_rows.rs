@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 
 use super::Measurements;
 use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
@@ -113,7 +113,7 @@ impl Measurements {
         let numbers = rows().flat_map(angles);
         let places = rows().filter_map(|row| self.positions.get(row));
         let angle = numbers.clone().map(f64::abs).fold(0.0, f64::max);
-        let distance = places.clone().map(nalgebra::Matrix::amax).fold(0.0, f64::max);
+        let distance = places.clone().map(Vector3::amax).fold(0.0, f64::max);
         if self.len() < MIN_NORMALISED_ROWS || angle < MIN_LOST_ANGLE || distance < MIN_LOST_PLACE {
             return Ok(());
         }

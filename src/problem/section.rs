@@ -333,6 +333,11 @@ fn proper_place(key: &str, known: &[String]) -> Option<String> {
     if known.iter().any(|known| one_typo(key, known)) {
         return None;
     }
+    if key.contains(['.', '*']) {
+        return Some(format!(
+            "{key} is a rule for parameters; write it below the line [parameters]"
+        ));
+    }
     if NAMES.contains(&key) {
         return Some(format!(
             "an effect stands below a line [[effect]]; write that line above {key}"

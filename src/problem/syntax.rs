@@ -102,7 +102,9 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
         )
     } else if OTHER_WORDS.contains(&word.to_lowercase().as_str()) {
         mistake("a word that TOML does not have", "write true or false, or text in quotes")
-    } else if has_unit(before, after) {
+    } else if unit_behind(before, after).as_deref() == Some("%") {
+        mistake("a percentage", "write a fraction, such as 0.3 for 30 %")
+    } else if unit_behind(before, after).is_some() {
         mistake(
             "a unit behind a number",
             "write the number alone; the end of the key states its unit, as in d_m = 0.36 or d_mm \
@@ -136,12 +138,12 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
     }
 }
 
-/// Returns true if a number and its unit stand at the place between `before` and `after`.
-fn has_unit(before: &str, after: &str) -> bool {
+/// Returns the unit behind a number that stands at the place between `before` and `after`.
+fn unit_behind(before: &str, after: &str) -> Option<String> {
     let is_end = |c: char| ",=[]{}#".contains(c);
     let start = before.rsplit(is_end).next().unwrap_or_default();
     let end = after.split(is_end).next().unwrap_or_default();
-    number_and_unit(format!("{start}{end}").trim()).is_some()
+    number_and_unit(format!("{start}{end}").trim()).map(|(_, unit)| unit.to_owned())
 }
 
 /// Returns the number of the line above that gives the same key in the same section.

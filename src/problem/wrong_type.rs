@@ -61,6 +61,19 @@ impl Item<'_, '_> {
                 };
                 Some(format!("without quotes: {}", write(value)))
             }
+            ("true or false", DeValue::Integer(number))
+                if ["0", "1"].contains(&number.as_str()) =>
+            {
+                Some(write(if number.as_str() == "1" { "true" } else { "false" }))
+            }
+            ("a number", DeValue::Array(_)) => {
+                let (end, suffix) = name.split_once('_')?;
+                let [least, most] = self.pair().ok().filter(|_| ["min", "max"].contains(&end))?;
+                Some(format!("write min_{suffix} = {least} and max_{suffix} = {most}"))
+            }
+            ("a table, { key = value }", DeValue::Integer(_)) if self.key.starts_with("effect") => {
+                Some(write(&format!("{{ joint = {} }}", self.written_number()?)))
+            }
             ("text in quotes", _) if name == "link" => {
                 let names = self.names_of("joint", &["beam", "name"]);
                 let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
@@ -80,15 +93,16 @@ impl Item<'_, '_> {
                 Some(write(&format!("\"{}\"", self.written_number()?)))
             }
             (list, DeValue::String(text)) if list.starts_with("a list") => {
-                let text = text.trim().trim_start_matches(['[', '(']).trim_end_matches([']', ')']);
+                let written = text.trim();
+                let text = written.trim_start_matches(['[', '(']).trim_end_matches([']', ')']);
                 let words: Vec<&str> =
                     text.split([',', ' ', ';']).filter(|word| !word.is_empty()).collect();
                 let are_numbers = words.iter().all(|word| word.parse::<f64>().is_ok());
                 if list.contains("numbers") {
                     return are_numbers.then(|| write(&format!("[{}]", words.join(", "))));
                 }
-                list.contains("file names")
-                    .then(|| write(&format!("[\"{}\"]", shortened(text, 60))))
+                let is_of_texts = list.contains("file names") || list.contains("in quotes");
+                is_of_texts.then(|| write(&format!("[\"{}\"]", shortened(written, 60))))
             }
             ("a list of 2 numbers", _) if is_number => {
                 let number = self.written_number()?;

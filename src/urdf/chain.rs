@@ -159,7 +159,12 @@ impl<'a> Chain<'a> {
             let ends = (0..robot.links.len()).filter(|&link| link != tip && !is_inner(link));
             let ends = ends.map(name).collect();
             let (base, tip) = (name(base), name(tip));
-            return Err(robot.error(UrdfErrorKind::NothingMoves { base, tip, ends }));
+            return Err(robot.error(UrdfErrorKind::NothingMoves {
+                base,
+                tip,
+                ends,
+                links: robot.links.len(),
+            }));
         }
         Ok(chain)
     }

@@ -270,13 +270,14 @@ fn wrong_arguments_end_with_status_two_and_help_with_zero() {
     ] {
         assert_contains(&folder.flexcal(arguments).code(2).stderr, &[words]);
     }
-    folder.write("my data.csv", "");
-    let spaced = folder.flexcal("check . --data my").code(2);
+    let sampler = Folder::with_lunar_sampler();
+    sampler.write("my data.csv", "");
+    let spaced = sampler.flexcal("identify . --data my").code(2);
     assert_contains(&spaced.stderr, &["quotes: there is \"my data.csv\""]);
     #[cfg(unix)]
     {
-        std::os::unix::fs::symlink("gone.csv", folder.path("latest.csv")).unwrap();
-        let linked = folder.flexcal("identify . --data latest.csv").code(2);
+        std::os::unix::fs::symlink("gone.csv", sampler.path("latest.csv")).unwrap();
+        let linked = sampler.flexcal("identify . --data latest.csv").code(2);
         assert_contains(&linked.stderr, &["latest.csv is a link to gone.csv, which is not there"]);
     }
     let commas = Folder::with_lunar_sampler().flexcal("identify . --data=a.csv,b.csv").code(2);

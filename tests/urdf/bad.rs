@@ -88,6 +88,7 @@ fn mistakes_are_named_with_their_place() {
             revolute("<origin xyz=\"0 0 0,22\"/>"),
             "write decimal points: \"0 0 0.22\"",
         ),
+        ("unit", revolute("<origin xyz=\"0 0 1m\"/>"), "write metres and radians, without units"),
         ("nan", revolute("<origin xyz=\"0 nan 0\"/>"), ":5: \"0 nan 0\" is not 3 finite numbers"),
         ("huge", revolute("<origin rpy=\"1e300 0 0\"/>"), ":5: \"1e300 0 0\" is not 3 finite"),
         (

@@ -18,6 +18,16 @@ fn values_of_another_type_are_shown_as_they_are_written() {
         ("[tool]\ntarget_m = '0, 0, 0.1'", &["write target_m = [0, 0, 0.1]"]),
         ("name = 'spin'\n[tool]\njoint = 'spin'", &["write joint = 1, the number of this joint"]),
         ("[tool]\njoint = 'nest'", &["write the number of the joint, counted from 1"]),
+        ("min_deg = [-10, 20]", &["write min_deg = -10 and max_deg = 20"]),
+        ("[parameters]\n'base.*' = { free = 1 }", &["found a number; write free = true"]),
+        ("[[effect]]\ngear-ratio = 1", &["write gear-ratio = { joint = 1 }"]),
+        ("[data]\nheld_out = { fraction = 30 %, seed = 1 }", &["a percentage", "write a fraction"]),
+        ("[data]\nheld_out = { fraction = 30, seed = 1 }", &["write 0.3 for 30 %"]),
+        (
+            "[[effect]]\nlaw = { name = 'w', at = 'joint1', terms = 'sin(q1)', sigma_deg = 1 }",
+            &["expected a list of formulas in quotes, found text; write terms = [\"sin(q1)\"]"],
+        ),
+        ("[data]\n'joint1.a' = { sigma_mm = 1 }", &["a rule for parameters; write it below"]),
         ("name = 3", &["expected text in quotes, found a number; write name = \"3\""]),
         ("[parameters]\n'joint1.a' = { free = 'yes' }", &["without quotes: write free = true"]),
         ("[data]\nfiles = 'a.csv'", &["write files = [\"a.csv\"]"]),
@@ -87,6 +97,8 @@ fn cells_that_programs_write_otherwise_are_named() {
     cell("(28.7328)", &["a negative number in parentheses; write -28.7328, or change the number"]);
     cell("28.73-", &["has its sign behind it; write -28.73"]);
     cell("'28.73", &["begins with an apostrophe", "write 28.73"]);
+    cell("~28.73", &["has a sign of comparison before it; write 28.73"]);
+    cell("50%", &["is a number with a unit; remove % from the cells"]);
     cell("28.73±0.1", &["has an uncertainty; write 28.73"]);
     cell("2.8*10^3", &["write 2.8e3"]);
     let empty = table(ARM, b"q1_deg,x_mm,y_mm,z_mm,split\n1,2,3,4,\n").unwrap_err();
