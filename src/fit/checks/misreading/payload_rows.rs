@@ -231,14 +231,14 @@ impl Rows<'_> {
 
     /// Returns the number of rows with another payload than the table states.
     fn count_changed(&self, payloads: &[f64]) -> usize {
-        payloads.iter().zip(&self.stated).filter(|(one, other)| one != other).count()
+        payloads.iter().zip(&self.stated).filter(|(one, other)| !is_same(**one, **other)).count()
     }
 
     /// Returns the mistake that one payload of the column is another number.
     fn of_level(&self, level: f64, found: &Fitted) -> Option<Mistake> {
-        let groups = self.stated.iter().map(|stated| (*stated == level).then_some(0));
+        let groups = self.stated.iter().map(|stated| is_same(*stated, level).then_some(0));
         let payloads = self.fitted(&found.x, &self.stated, &groups.collect::<Vec<_>>())?.payloads;
-        let place = self.stated.iter().position(|stated| *stated == level)?;
+        let place = self.stated.iter().position(|stated| is_same(*stated, level))?;
         let words = format!(
             "payloads of {} kg that were about {} kg",
             shown(level),
@@ -311,8 +311,8 @@ impl Rows<'_> {
                         shown(other)
                     );
                     add(words, &|_, stated| match stated {
-                        stated if stated == one => other,
-                        stated if stated == other => one,
+                        stated if is_same(stated, one) => other,
+                        stated if is_same(stated, other) => one,
                         stated => stated,
                     });
                 }
@@ -359,11 +359,11 @@ impl Rows<'_> {
         let rows = &self.trial.chosen;
         let payloads = self.assigned(levels, found);
         let changed: Vec<usize> =
-            (0..rows.len()).filter(|&k| payloads[k] != self.stated[k]).collect();
+            (0..rows.len()).filter(|&k| !is_same(payloads[k], self.stated[k])).collect();
         let (&first, &last) = (changed.first()?, changed.last()?);
         let place = |k: usize| table.location(rows[k]);
         let stated = self.stated[first];
-        let is_held = self.stated[first..=last].iter().all(|other| *other == stated);
+        let is_held = self.stated[first..=last].iter().all(|other| is_same(*other, stated));
         let words = if is_sorted(column) {
             "a column of payloads that was sorted by itself, unlike the other columns".to_owned()
         } else if is_held {
@@ -427,6 +427,11 @@ fn misfit(found: &Fitted, payloads: &[f64]) -> f64 {
 /// Returns true if the numbers rise, or fall, from the first to the last.
 fn is_sorted(column: &[f64]) -> bool {
     column.is_sorted() || column.is_sorted_by(|one, other| one >= other)
+}
+
+/// Returns true if two payloads are the same number.
+fn is_same(one: f64, other: f64) -> bool {
+    one.total_cmp(&other).is_eq()
 }
 
 /// Formats a payload.

@@ -36,7 +36,7 @@ impl Misreading {
     /// Returns true for a misreading that often comes with another one.
     fn is_usual(self) -> bool {
         match self {
-            Self::Reversed { joints } => joints.count_ones() == 1,
+            Self::Reversed { joints } => joints.is_power_of_two(),
             Self::Zero { degrees, .. } => degrees % 90 == 0,
             Self::Mirrored { .. }
             | Self::Exchanged { .. }
