@@ -68,7 +68,12 @@ pub(super) fn is_spreadsheet_error(word: &str) -> bool {
     let code = word.strip_prefix("Err:").unwrap_or_default();
     let is_code = !code.is_empty() && code.bytes().all(|byte| byte.is_ascii_digit());
     let named = word.strip_prefix('#').unwrap_or_default();
-    is_code || named.starts_with(|c: char| c.is_alphabetic() || c == '#')
+    let is_upper = |word: &str| {
+        !word.is_empty() && word.chars().all(|c| c.is_uppercase() || "/0_".contains(c))
+    };
+    let is_named = named.strip_suffix(['!', '?']).is_some_and(is_upper);
+    let is_filled = word.len() > 2 && word.bytes().all(|byte| byte == b'#');
+    is_code || is_named || is_filled || is_not_available(word)
 }
 
 /// Returns true for the mark of a spreadsheet that a value is not available, in several languages.

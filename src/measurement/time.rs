@@ -182,8 +182,9 @@ pub(super) fn number_as_time(text: &str) -> Option<String> {
         let seconds = (number - zero) * 86_400.0;
         if is_date(&seconds) {
             return Some(format!(
-                "a day number of {program}, {}; format the column as date and time, and export it \
-                 again",
+                "a number without a unit; as a day number of {program} it is {}: then format the \
+                 column as date and time, and export it again; if it counts seconds, call the \
+                 column time_s",
                 shown(seconds.round())
             ));
         }

@@ -27,7 +27,8 @@ impl Table {
         let cells = self.cells().iter().map(String::from_utf8_lossy).collect::<Vec<_>>();
         let row = cells.join(&header.to_string());
         let is_other = |other: &char| *other != header && row.split(*other).count() == expected;
-        [';', '\t', ',', '|'].into_iter().find(is_other).filter(|_| expected > 1)
+        let is_whole = cells.len() == 1 && expected > 1;
+        [';', '\t', ',', '|'].into_iter().find(is_other).filter(|_| is_whole)
     }
 
     /// Returns the error of an empty cell of the current row, or of the whole row if it is empty or

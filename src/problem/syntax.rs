@@ -143,7 +143,11 @@ fn unit_behind(before: &str, after: &str) -> Option<String> {
     let is_end = |c: char| ",=[]{}#".contains(c);
     let start = before.rsplit(is_end).next().unwrap_or_default();
     let end = after.split(is_end).next().unwrap_or_default();
-    number_and_unit(format!("{start}{end}").trim()).map(|(_, unit)| unit.to_owned())
+    // A word before a = is a key.
+    let is_key = after.strip_prefix(end).is_some_and(|rest| rest.starts_with('='));
+    let whole = format!("{start}{end}");
+    let (_, unit) = number_and_unit(whole.trim()).filter(|_| !is_key)?;
+    Some(unit.to_owned())
 }
 
 /// Returns the number of the line above that gives the same key in the same section.

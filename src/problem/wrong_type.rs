@@ -3,7 +3,6 @@
 use toml::de::DeValue;
 
 use super::item::Item;
-use crate::error::shortened;
 use crate::quantity::Unit;
 
 /// Signs of units with the endings of keys that state them.
@@ -32,7 +31,8 @@ impl Item<'_, '_> {
                 if ["joint", "joints", "from", "parent"].contains(&name) =>
             {
                 let names = self.names_of("joint", &["name"]);
-                let place = names.iter().position(|name| *name == text.trim());
+                let is_meant = |name: &String| !name.is_empty() && *name == text.trim();
+                let place = names.iter().position(is_meant);
                 Some(match place {
                     Some(place) => {
                         format!("{}, the number of this joint", write(&(place + 1).to_string()))
@@ -43,14 +43,13 @@ impl Item<'_, '_> {
             ("a number" | "a whole number", DeValue::String(text)) => {
                 let text = text.trim();
                 let decimal = text.replace(',', ".");
-                if decimal.parse::<f64>().is_ok() {
+                if decimal.parse().is_ok_and(f64::is_finite) {
                     return Some(format!("a number stands without quotes: {}", write(&decimal)));
                 }
                 let (number, unit) = number_and_unit(text)?;
-                Some(format!(
-                    "the end of the key states the unit, and the value is the number alone: {}",
-                    with_unit(name, number, unit)
-                ))
+                let told = "the end of the key states the unit, and the value is the number alone";
+                let written = with_unit(name, number, unit).filter(|_| !key.contains('['));
+                Some(written.map_or_else(|| told.to_owned(), |it| format!("{told}: write {it}")))
             }
             ("true or false", DeValue::String(text)) => {
                 let word = text.trim().to_lowercase();
@@ -97,12 +96,16 @@ impl Item<'_, '_> {
                 let text = written.trim_start_matches(['[', '(']).trim_end_matches([']', ')']);
                 let words: Vec<&str> =
                     text.split([',', ' ', ';']).filter(|word| !word.is_empty()).collect();
-                let are_numbers = words.iter().all(|word| word.parse::<f64>().is_ok());
+                let is_number = |word: &&str| word.parse().is_ok_and(f64::is_finite);
+                let are_numbers = !words.is_empty() && words.iter().all(is_number);
                 if list.contains("numbers") {
                     return are_numbers.then(|| write(&format!("[{}]", words.join(", "))));
                 }
                 let is_of_texts = list.contains("file names") || list.contains("in quotes");
-                is_of_texts.then(|| write(&format!("[\"{}\"]", shortened(written, 60))))
+                // What is written must be the whole text, as TOML takes it.
+                let is_plain =
+                    written.len() <= 60 && !written.contains([',', ';', '\'', '"', '\\']);
+                (is_of_texts && is_plain).then(|| write(&format!("[\"{written}\"]")))
             }
             ("a list of 2 numbers", _) if is_number => {
                 let number = self.written_number()?;
@@ -151,15 +154,11 @@ pub(super) fn number_and_unit(text: &str) -> Option<(&str, &str)> {
 }
 
 /// Writes a number with its unit in the ending of the key, as in `d_mm = 360` for `360 mm` under
-/// `d_m`.
-fn with_unit(key: &str, number: &str, unit: &str) -> String {
+/// `d_m`; `None` if files do not write the quantity of the key in this unit.
+fn with_unit(key: &str, number: &str, unit: &str) -> Option<String> {
     let sign = UNIT_SIGNS.iter().find(|(sign, _)| *sign == unit);
     let unit = sign.map_or(unit, |(_, suffix)| suffix);
-    let is_suffix = |unit: &str| Unit::all_suffixes().any(|suffix| suffix == unit);
-    match key.rsplit_once('_') {
-        Some((base, suffix)) if is_suffix(suffix) && is_suffix(unit) => {
-            format!("{base}_{unit} = {number}")
-        }
-        _ => format!("{key} = {number}"),
-    }
+    let (base, suffix) = key.rsplit_once('_')?;
+    let is_known = suffix == unit || Unit::are_of_one_quantity([suffix, unit]);
+    is_known.then(|| format!("{base}_{unit} = {number}"))
 }

@@ -397,19 +397,27 @@ impl Unit {
         }
     }
 
+    /// Units that can occur in declarations of arms and in measurements.
+    const OF_FILES: [Self; 9] = [
+        Self::Angle,
+        Self::Length,
+        Self::Mass,
+        Self::Force,
+        Self::FlexuralRigidity,
+        Self::TorsionalStiffness,
+        Self::Acceleration,
+        Self::Temperature,
+        Self::Time,
+    ];
+
     /// Returns every suffix that can occur in declarations of arms and in measurements.
     pub(crate) fn all_suffixes() -> impl Iterator<Item = &'static str> {
-        let units = [
-            Self::Angle,
-            Self::Length,
-            Self::Mass,
-            Self::Force,
-            Self::FlexuralRigidity,
-            Self::TorsionalStiffness,
-            Self::Acceleration,
-            Self::Temperature,
-            Self::Time,
-        ];
-        units.into_iter().flat_map(Self::suffixes).map(|suffix| suffix.name)
+        Self::OF_FILES.into_iter().flat_map(Self::suffixes).map(|suffix| suffix.name)
+    }
+
+    /// Returns true if files may write one quantity with both suffixes.
+    pub(crate) fn are_of_one_quantity(suffixes: [&str; 2]) -> bool {
+        let has_both = |unit: Self| suffixes.iter().all(|suffix| unit.suffix(suffix).is_some());
+        Self::OF_FILES.into_iter().any(has_both)
     }
 }
