@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::checked_fit::CheckedFit;
 use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL};
-use super::mistaken_rows::registration_error;
+use super::registered_rows::registration_error;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::{Measurements, Split};
 use crate::problem::JointKind;

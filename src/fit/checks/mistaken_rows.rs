@@ -7,10 +7,11 @@ use nalgebra::{DVector, Vector3};
 use super::checked_fit::CheckedFit;
 use super::doubted_columns::{column_name, moving};
 use super::misreading::reading_of_rows;
+use super::registered_rows::registration_error;
 use crate::fit::SolverChoice;
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::stages::stage::Stage;
-use crate::measurement::{Measurements, Split};
+use crate::measurement::Split;
 use crate::model::Pose;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::JointKind;
@@ -315,34 +316,6 @@ impl MistakenRows<'_, '_> {
         let mut factors = LENGTH_FACTORS.into_iter().filter(|_| has_enough);
         factors.find(fits).map(|(_, words)| format!("their positions are in another unit: {words}"))
     }
-}
-
-/// Returns the rms error of the nominal arm after its registration to the `chosen` rows of
-/// `measurements` alone \[m\].
-pub(super) fn registration_error(
-    fit: &CheckedFit,
-    measurements: &Measurements,
-    chosen: &[usize],
-) -> Option<f64> {
-    let split = Split { identification: chosen.to_vec(), held_out: Vec::new() };
-    of_rows(fit, measurements, &split, |fitting| {
-        let x = fitting.registered().ok()?;
-        Some(fit.rms(chosen, &fitting.position_errors(chosen, &x)))
-    })
-}
-
-/// Calls `evaluate` with the fit of the identification rows of `split` alone.
-pub(super) fn of_rows<R>(
-    fit: &CheckedFit,
-    measurements: &Measurements,
-    split: &Split,
-    evaluate: impl FnOnce(&Fitting) -> R,
-) -> R {
-    let Fitting { placement, model, .. } = *fit.fitting;
-    let held_out_only = placement.held_out_only(model, measurements, split);
-    let declared = fit.fitting.with_declared_noise();
-    let fitting = Fitting { split, measurements, turn_sigma: None, held_out_only, ..declared };
-    evaluate(&fitting)
 }
 
 /// Function of a row and the index of a word that returns the indices of base and target of the row

@@ -38,6 +38,7 @@ mod pose_range;
 pub(super) mod pose_sufficiency;
 mod prediction;
 pub(super) mod priors;
+mod registered_rows;
 pub(super) mod required_columns;
 pub(super) mod row_kind;
 mod row_relation;
