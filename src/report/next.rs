@@ -41,7 +41,9 @@ pub fn next(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Story
     blocks.extend(is_trusted.then(|| Block::Text(error_paragraph(next, percent))));
     if !next.effects.is_empty() {
         let effects = next.effects.iter().map(crate::problem::Effect::describe);
-        let label = if next.effects.len() == 1 {
+        let label = if next.stop == Some(StopReason::CausesAlike) {
+            "Effects that stay open:"
+        } else if next.effects.len() == 1 {
             "Effect that the poses test:"
         } else {
             "Effects that the poses distinguish:"

@@ -307,15 +307,13 @@ pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> 
 /// choice of effects and that spoil its fit; `None` if there are none. `problem` is the path of the
 /// problem file.
 pub fn influential_rows_advice(found: &Identification, problem: &Path) -> Option<String> {
-    let rows: Vec<String> = match found.finding(FindingCode::ExcludedRowsFitted) {
-        Some(finding) => {
-            let place = |row: &Value| Some(format!("{}:{}", row["file"].as_str()?, row["line"]));
-            finding.value("rows")?.as_array()?.iter().filter_map(place).collect()
-        }
-        None => {
-            let rows = found.influential_rows.as_ref()?.rows.iter();
-            rows.map(|row| row.location.to_string()).collect()
-        }
+    let excluded = found.finding(FindingCode::ExcludedRowsFitted);
+    let rows: Vec<String> = if let Some(finding) = excluded {
+        let place = |row: &Value| Some(format!("{}:{}", row["file"].as_str()?, row["line"]));
+        finding.value("rows")?.as_array()?.iter().filter_map(place).collect()
+    } else {
+        let rows = found.influential_rows.as_ref()?.rows.iter();
+        rows.map(|row| row.location.to_string()).collect()
     };
     let rows = joined(rows, MAX_SHOWN_INFLUENTIAL, ", ");
     Some(format!(

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
-use super::excluded_rows::excluded_rows_finding;
+use super::excluded_rows::withhold_claims;
 use super::found::{Found, found};
 use super::gravity::other_gravity;
 use super::misread_effect::with_misread_effect;
@@ -200,20 +200,12 @@ pub fn close_by(
     if unexplained.is_empty() {
         unexplained.extend(unexplained::unlocated(&residual_tests));
     }
-    let rows = data.evidence_rows();
-    let supporting_alone =
-        evidence.iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
-    let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(supporting_alone).collect();
-    let set_aside: Vec<Location> =
-        aside.into_iter().map(|row| data.measurements.location(row)).collect();
+    let set_aside = set_aside(&fitted, evidence.as_ref(), &data);
     let contradicted = [FindingCode::HeldOutBeyondPrediction, FindingCode::RowsSetAside];
     let is_noise =
         unexplained.is_empty() && !contradicted.iter().any(|code| fitted.found.has(*code));
-    let excluded = excluded_rows_finding(&fitted.found, &set_aside)
-        .filter(|_| is_noise && !effects.is_empty());
-    if excluded.is_some() {
-        effects.iter_mut().for_each(|found| found.status = found.status.max(Status::Probable));
-    }
+    let excluded = is_noise.then(|| withhold_claims(&fitted.found, &set_aside, &mut effects));
+    let excluded = excluded.flatten();
     let is_noise = is_noise && excluded.is_none();
     let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
     let is_noise_with_found =
@@ -276,6 +268,16 @@ pub fn close_by(
         rules: rules.clone(),
         found_alone,
     })
+}
+
+/// Returns the places of the rows that were excluded from the choice of effects: those with gross
+/// errors, and those that alone supported an effect.
+fn set_aside(fitted: &Fitted, evidence: Option<&Evidence>, data: &Data) -> Vec<Location> {
+    let rows = data.evidence_rows();
+    let supporting_alone =
+        evidence.into_iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
+    let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(supporting_alone).collect();
+    aside.into_iter().map(|row| data.measurements.location(row)).collect()
 }
 
 /// Returns the finding that the extended problem does not fit the measured orientations; `None` if

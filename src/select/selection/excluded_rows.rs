@@ -3,6 +3,8 @@
 
 use serde_json::json;
 
+use super::found::Found;
+use super::status::Status;
 use crate::error::Location;
 use crate::fit::{Finding, FindingCode, Identification, Noise};
 use crate::quantity::format::{counted, number};
@@ -10,13 +12,23 @@ use crate::quantity::format::{counted, number};
 /// Maximum number of rows that the text of the finding names.
 const MAX_NAMED_ROWS: usize = 3;
 
+/// Lowers the status of found effects to probable if rows that took no part in their choice
+/// (`excluded`) spoil the fit `found` with these effects, and returns the finding on these rows.
+/// `None` if they do not, or if there is no effect.
+pub(super) fn withhold_claims(
+    found: &Identification,
+    excluded: &[Location],
+    effects: &mut [Found],
+) -> Option<Finding> {
+    let finding = excluded_rows_finding(found, excluded).filter(|_| !effects.is_empty())?;
+    effects.iter_mut().for_each(|effect| effect.status = effect.status.max(Status::Probable));
+    Some(finding)
+}
+
 /// Returns the finding that the `excluded` rows, which the choice of effects left out, count in full
 /// in the fit `found` and make its residual larger than the declared noise; `None` if they do not.
 /// The effects explain the other rows, but the values of their parameters follow the wrong ones.
-pub(super) fn excluded_rows_finding(
-    found: &Identification,
-    excluded: &[Location],
-) -> Option<Finding> {
+fn excluded_rows_finding(found: &Identification, excluded: &[Location]) -> Option<Finding> {
     let (chi2, (_, highest)) = found.reduced_chi2.zip(found.chance)?;
     if excluded.is_empty() || found.noise != Noise::Declared || chi2 <= highest {
         return None;
