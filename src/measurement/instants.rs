@@ -45,7 +45,9 @@ impl Table {
             })
         };
         let by_rule = ruled(&is_time);
-        let date = ruled(&|ours| ours == DATE).or_else(|| named(&DATES));
+        let date_by_rule = ruled(&|ours| ours == DATE);
+        let are_ruled = by_rule.is_some() && date_by_rule.is_some();
+        let date = date_by_rule.or_else(|| named(&DATES));
         let Some(columns @ [date, time]) =
             date.zip(by_rule.or_else(|| named(&TIMES_OF_DAY))).map(|(date, time)| [date, time])
         else {
@@ -59,7 +61,8 @@ impl Table {
         let text = joined(cell(date), cell(time));
         let is_other_clock = |place: usize, name: &String| place != time && is_time(name);
         let mut names = self.header.iter().enumerate();
-        if !is_instant(&text)
+        // If rules name both columns, a cell that is no time is an error in its row.
+        if !(are_ruled || is_instant(&text))
             || is_instant(cell(time))
             || by_rule.is_none() && names.any(|(place, name)| is_other_clock(place, name))
         {

@@ -95,13 +95,13 @@ impl Measurements {
         table_use: Use,
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let as_declared = Self::read_files(files, problem, table_use);
-        let are_same = || {
-            let declared = &problem.data.files;
-            let mut pairs = files.iter().zip(declared);
-            files.len() == declared.len()
-                && pairs.all(|(file, other)| file == other || same_file(file, other))
+        // The log that the problem names is that of its tables, to which planned poses may be added.
+        let is_declared = |file: &PathBuf| {
+            problem.data.files.iter().any(|other| file == other || same_file(file, other))
         };
-        let is_open = |log: &&JointLog| log.is_given || log.by.has_no_offset() && are_same();
+        let is_open = |log: &&JointLog| {
+            log.is_given || log.by.has_no_offset() && files.iter().any(is_declared)
+        };
         let open = problem.data.joint_log.as_ref().filter(is_open);
         let found = as_declared.as_ref().err().and_then(|error| match &*error.kind {
             InputErrorKind::Table(kind) => kind.clock_offset(),

@@ -1,5 +1,7 @@
 //! Parsers of dates and times.
 
+use std::borrow::Cow;
+
 /// Order of day and month in dates with slashes and the year last, such as `05/31/2024`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum DateOrder {
@@ -48,6 +50,7 @@ impl DateOrder {
 /// day. If neither does, the month is first if the time has AM or PM; otherwise the date is not
 /// accepted ([`is_ambiguous`]).
 pub(super) fn date_time(text: &str, order: DateOrder) -> Option<f64> {
+    let text = &*with_colons(text);
     iso_8601(text)
         .or_else(|| iso_8601(&iso_from_day_first(text.trim())?))
         .or_else(|| iso_8601(&iso_from_slashes(text.trim())?))
@@ -57,10 +60,23 @@ pub(super) fn date_time(text: &str, order: DateOrder) -> Option<f64> {
         })
 }
 
+/// Returns a date and time whose time of day has colons in place of points, as in `14.02.29`, and
+/// whose date ends without a comma.
+fn with_colons(text: &str) -> Cow<'_, str> {
+    let Some((date, clock)) = text.trim().split_once(' ') else { return Cow::Borrowed(text) };
+    let clock = clock.trim_start();
+    let has_points = !clock.contains(':') && clock.matches('.').count() >= 2;
+    if !has_points && !date.ends_with(',') {
+        return Cow::Borrowed(text);
+    }
+    let clock = if has_points { clock.replacen('.', ":", 2) } else { clock.to_owned() };
+    Cow::Owned(format!("{} {clock}", date.trim_end_matches(',')))
+}
+
 /// Returns true for a date with slashes whose day and month may stand in either order, so that
 /// [`date_time`] does not accept it.
 pub(super) fn is_ambiguous(text: &str, order: DateOrder) -> bool {
-    iso_from_year_last(text.trim(), order)
+    iso_from_year_last(with_colons(text).trim(), order)
         .is_some_and(|(date, basis)| basis == Basis::Guess && iso_8601(&date).is_some())
 }
 
@@ -328,6 +344,8 @@ mod tests {
         for (text, seconds) in [
             ("1970-01-01T00:00:00Z", Some(0.0)),
             ("2000-02-29 12:00:00", Some(951_825_600.0)),
+            ("29.02.2000 12.00.00", Some(951_825_600.0)),
+            ("29.02.2000, 12:00:00.5", Some(951_825_600.5)),
             ("2024-05-31T14:03:20.25+02:00", Some(1_717_157_000.25)),
             ("2024-05-31T14:03", Some(1_717_164_180.0)),
             ("20240531T140320Z", Some(1_717_164_200.0)),

@@ -216,7 +216,8 @@ fn inverse_poses_are_named() {
 
 #[test]
 fn a_number_of_the_joint_table_that_was_typed_wrongly_is_named() {
-    let cases: [(fn(&mut Problem), &str); 2] = [
+    type Mistake = fn(&mut Problem);
+    let cases: [(Mistake, &str); 2] = [
         (|arm| arm.joints[2].a = 0.96, "a of joint 3 that is about"),
         (|arm| arm.joints[3].alpha += 0.7, "alpha of joint 4 that is about -"),
     ];

@@ -318,6 +318,9 @@ fn a_probe_that_is_mounted_in_another_way_is_no_misread_table() {
     assert!(beyond.starts_with("tool.r"), "{beyond}");
 }
 
+/// Orientation that a table gives in each row.
+type Turn<'a> = &'a dyn Fn(usize) -> UnitQuaternion<f64>;
+
 #[test]
 fn orientations_of_other_rows_and_of_a_turned_target_are_named() {
     let problem = ur10();
@@ -330,7 +333,7 @@ fn orientations_of_other_rows_and_of_a_turned_target_are_named() {
     };
     let late = |row: usize| turns[row.saturating_sub(1)];
     let turned = |row: usize| if row < 30 { turns[row] } else { turns[row] * quarter };
-    let cases: [(&dyn Fn(usize) -> UnitQuaternion<f64>, &str); 3] = [
+    let cases: [(Turn, &str); 3] = [
         (&late, "each orientation belongs to the row before"),
         (&turned, "on the measured frame is turned by 90.0°"),
         (&|row| reordered(&turns[row]), "R = Rz Ry Rx whose columns hold z, y, x"),

@@ -129,6 +129,12 @@ fn no_effect_explains(declared: &Fitted) -> bool {
     is_hopeless || declared.found.has(FindingCode::LensContradicted)
 }
 
+/// Returns true if rows contradict a fit: held-out ones, or some that are set aside.
+fn is_contradicted(found: &Identification) -> bool {
+    let codes = [FindingCode::HeldOutBeyondPrediction, FindingCode::RowsSetAside];
+    codes.iter().any(|code| found.has(*code))
+}
+
 /// Runs the loop like [`close`], with other settings.
 ///
 /// # Errors
@@ -201,11 +207,9 @@ pub fn close_by(
         unexplained.extend(unexplained::unlocated(&residual_tests));
     }
     let set_aside = set_aside(&fitted, evidence.as_ref(), &data);
-    let contradicted = [FindingCode::HeldOutBeyondPrediction, FindingCode::RowsSetAside];
-    let is_noise =
-        unexplained.is_empty() && !contradicted.iter().any(|code| fitted.found.has(*code));
-    let excluded = is_noise.then(|| withhold_claims(&fitted.found, &set_aside, &mut effects));
-    let excluded = excluded.flatten();
+    let is_noise = unexplained.is_empty() && !is_contradicted(&fitted.found);
+    let claims = is_noise.then_some(effects.as_mut_slice());
+    let excluded = withhold_claims(&fitted.found, &set_aside, claims);
     let is_noise = is_noise && excluded.is_none();
     let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
     let is_noise_with_found =

@@ -14,14 +14,17 @@ const MAX_NAMED_ROWS: usize = 3;
 
 /// Lowers the status of found effects to probable if rows that took no part in their choice
 /// (`excluded`) spoil the fit `found` with these effects, and returns the finding on these rows.
-/// `None` if they do not, or if there is no effect.
+/// `None` if they do not, or if there is no effect, as in a loop that explains nothing.
 pub(super) fn withhold_claims(
     found: &Identification,
     excluded: &[Location],
-    effects: &mut [Found],
+    effects: Option<&mut [Found]>,
 ) -> Option<Finding> {
-    let finding = excluded_rows_finding(found, excluded).filter(|_| !effects.is_empty())?;
-    effects.iter_mut().for_each(|effect| effect.status = effect.status.max(Status::Probable));
+    let effects = effects.filter(|effects| !effects.is_empty())?;
+    let finding = excluded_rows_finding(found, excluded)?;
+    for effect in effects {
+        effect.status = effect.status.max(Status::Probable);
+    }
     Some(finding)
 }
 
