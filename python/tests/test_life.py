@@ -171,5 +171,5 @@ def test_fleet(arm: Sessions, command: Command) -> None:
     _, out = command("fleet", *files, file="PRIOR.toml")
     assert (out / "PRIOR.toml").read_text() == prior.read_text()
     assert arm.problem.identify(arm.measured(5, 20), prior=prior).trusted
-    with pytest.raises(flexcal.InputError, match="too few for a fleet"):
+    with pytest.raises(flexcal.InputError, match="a fleet of 2 is too small"):
         flexcal.fleet(files[:2])

@@ -157,8 +157,8 @@ pub(super) fn missed(miss: f64) -> String {
 pub(super) fn renumbered(crossed: Option<[usize; 2]>) -> String {
     match crossed {
         Some([a, b]) => format!(
-            "corners {a} and {b} exchanged: the order of points_mm crosses the tag, but detectors go \
-             round it; exchange points {a} and {b} of points_mm"
+            "corners {a} and {b} exchanged: points_mm goes round the tag in another order than the \
+             detector; exchange {a} and {b} in points_mm, or in the column point"
         ),
         None => {
             "corners along and across exchanged; declare points_mm as the detector counts them, \

@@ -127,6 +127,8 @@ pub(super) struct ClockShift {
 /// Largest time between rows that an undeclared offset of the clocks pairs, as a fraction of the time
 /// between two rows of the joint table: rows of other poses are seldom so near.
 const MAX_CLEAR_GAP: f64 = 0.25;
+/// Smallest ratio to that time of the time to any other row.
+const MIN_CLEAR_RATIO: f64 = 2.0;
 /// Smallest number of measured rows with which such an offset is taken.
 const MIN_CLEAR_ROWS: usize = 10;
 
@@ -135,7 +137,17 @@ impl ClockShift {
     /// the shift may be taken without being declared.
     pub fn is_clear(self, times: &[f64], log: &[f64]) -> bool {
         let is_close = median_step(log).is_some_and(|step| self.gap <= MAX_CLEAR_GAP * step);
-        is_close && times.len() >= MIN_CLEAR_ROWS
+        // The row that is next nearest to each must not be its partner as well.
+        let is_only = |time: &f64| {
+            let time = time - self.seconds;
+            let partner = nearest(log, time).filter(|(_, gap)| *gap <= self.gap);
+            partner.is_none_or(|(place, _)| {
+                let around = [place.checked_sub(1), Some(place + 1)].into_iter().flatten();
+                let mut others = around.filter_map(|other| log.get(other));
+                others.all(|other| (other - time).abs() > MIN_CLEAR_RATIO * self.gap)
+            })
+        };
+        is_close && times.len() >= MIN_CLEAR_ROWS && times.iter().all(is_only)
     }
 }
 

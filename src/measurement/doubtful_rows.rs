@@ -117,7 +117,7 @@ impl Measurements {
         if self.len() < MIN_NORMALISED_ROWS || angle < MIN_LOST_ANGLE || distance < MIN_LOST_PLACE {
             return Ok(());
         }
-        let is_whole = |value: f64| (value - value.round()).abs() < MAX_OFF_WHOLE * value.abs();
+        let is_whole = |value: f64| (value - value.round()).abs() <= MAX_OFF_WHOLE * value.abs();
         let are_degrees = numbers.clone().all(|q| is_whole(q.to_degrees()));
         let are_radians = numbers.clone().all(is_whole);
         let unit = self.position_unit.unwrap_or(1e-3);

@@ -118,11 +118,7 @@ impl Measurements {
         let hoists = problem.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
         let force = hoists.map(|hoist| hoist.force).find(|force| *force != 0.0);
         let payload = Some(problem.tool.payload_mass).filter(|mass| *mass > 0.0);
-        let columns = [
-            ("payload_kg", &self.payload, payload),
-            ("hoist_N", &self.hoist, force),
-            ("temperature_C", &self.temperature, problem.data.reference_temperature),
-        ];
+        let columns = [("payload_kg", &self.payload, payload), ("hoist_N", &self.hoist, force)];
         let median = |values: &Option<Vec<f64>>| {
             let mut values = values.clone()?;
             values.sort_by(f64::total_cmp);

@@ -67,7 +67,7 @@ await test("a page of 10 000 poses is small, paints at once and asks for nothing
     const paint = await page.waitForFunction(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime);
     times.push(await paint.jsonValue());
     if (k === 2) {
-      assert.match(await page.$eval("figure figcaption", (caption) => caption.textContent), /of \d+ poses are drawn/);
+      assert.match(await page.$eval("figure figcaption", (caption) => caption.textContent), /of \d+ rows are drawn/);
       const brush = await page.$eval("#brush output", (output) => output.textContent);
       const [, held] = brush.match(/^about 10000 of 10000 poses; rms residual of .* held out about ([\d.]+) mm$/) ?? assert.fail(brush);
       const whole = JSON.parse(fs.readFileSync(folder + "/many/estimate.json")).held_out.rms_mm.norm;

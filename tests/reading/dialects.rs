@@ -175,7 +175,7 @@ fn conditions_and_angles_in_another_unit_are_asked_about() {
     assert_contains(
         &angles(3.0, 12),
         &[
-            "rows.csv:8: joint 1: no joint turns by more than 3.0° from zero; if the columns are in radians",
+            "rows.csv:8: joint 1: no joint turns by more than 3.0° from zero, and this row turns it most; if the columns are in radians or turns",
         ],
     );
     assert_eq!((angles(3.0, 8), angles(30.0, 12)), (String::new(), String::new()));

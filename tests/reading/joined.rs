@@ -278,15 +278,26 @@ fn the_offset_of_the_clocks_is_named_whatever_the_tolerance() {
     let (log, measured) = stops();
     for tolerance in [0.05, 0.2, 0.5, 1.2, 1.5, 2.0, 4.0, 5.0, 10.0, 60.0, 999.0] {
         let more = format!(", tolerance_s = {tolerance}");
-        let (rows, warnings) = read_times(&more, &log, &measured).unwrap();
-        let said = words(&warnings);
-        assert!(rows.len() >= 38, "{}", rows.len());
+        let found = read_times(&more, &log, &measured);
+        // A declared tolerance is not replaced.
+        assert_eq!(found.is_ok(), tolerance > 0.9, "{tolerance}");
+        let said = match found {
+            Ok((rows, warnings)) => {
+                assert!(rows.len() >= 38, "{}", rows.len());
+                words(&warnings)
+            }
+            Err(error) => error.to_string(),
+        };
         assert!(said.contains("offset_s = -124.") || said.contains("offset_s = -125."), "{said}");
         assert_eq!(said.contains(" and tolerance_s = "), tolerance < 0.9, "{said}");
         // One that is declared is not replaced.
         let error = read_times(&format!("{more}, offset_s = 3.5"), &log, &measured).unwrap_err();
         assert_contains(&error.to_string(), &["write offset_s = -12"]);
     }
+    let (rows, warnings) = read_times("", &log, &measured).unwrap();
+    assert!(rows.len() >= 38 && words(&warnings).contains(" and tolerance_s = "));
+    // Nor is an offset of 0 that is written.
+    assert!(read_times(", offset_s = 0", &log, &measured).is_err());
     let (rows, warnings) =
         read_times(", offset_s = -124.8, tolerance_s = 1.1", &log, &measured).unwrap();
     assert_eq!((rows.len(), words(&warnings)), (40, String::new()));

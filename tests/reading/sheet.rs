@@ -28,7 +28,7 @@ fn a_data_sheet_becomes_a_problem_that_holds_what_positions_cannot_tell() {
     folder.flexcal("init arm/problem.toml --out again").success();
     assert_eq!(folder.read("again/problem.toml"), text);
     let wrong = folder.flexcal("init sheet.toml --tip flange --out arm").code(2);
-    assert_contains(&wrong.stderr, &["--tip and --board belong to a URDF"]);
+    assert_contains(&wrong.stderr, &["belong to a URDF, not to a table of joints"]);
 }
 
 #[test]

@@ -314,7 +314,7 @@ fn thousands_of_poses_make_no_large_page() {
     check(&page);
     assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());
     assert!(
-        page.html.contains("poses are drawn, including those with the largest residuals."),
+        page.html.contains("rows are drawn, including those with the largest residuals."),
         "what is left out is said"
     );
 }

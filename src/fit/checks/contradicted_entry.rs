@@ -311,9 +311,9 @@ mod tests {
 
     #[test]
     fn mistyped_digits_are_recognised() {
-        assert_eq!(typing_error(-325.0, -425.3), Some((-425.0, "one other digit")));
-        assert_eq!(typing_error(194.65, 94.7), Some((94.65, "one other digit")));
-        assert_eq!(typing_error(240.0, 420.2), Some((420.0, "two digits exchanged")));
+        assert_eq!(typing_error(-325.0, -425.3), Some((-425.0, "and one digit mistyped")));
+        assert_eq!(typing_error(194.65, 94.7), Some((94.65, "and one digit mistyped")));
+        assert_eq!(typing_error(240.0, 420.2), Some((420.0, "and two digits exchanged")));
         assert_eq!(typing_error(82.3, 113.0), None);
         assert_eq!(typing_error(800.0, 805.05), None);
         assert_eq!(typing_error(0.0, 5.0), None);

@@ -127,12 +127,13 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         fit.fitting.split.held_out.iter().copied().filter(is_position).collect();
     let errors = fit.fitting.position_errors(&held_out, &trial.x);
     let far = held_out.iter().zip(&errors).filter(|(_, of)| of.norm() > before.max(trial.limit));
-    let far: Vec<String> =
-        far.map(|(&row, _)| measurements.location(row).to_string()).take(MAX_HELD_OUT).collect();
-    let far = if far.is_empty() {
-        String::new()
-    } else {
-        format!(", and {} of the held-out rows", far.join(", "))
+    let far: Vec<String> = far.map(|(&row, _)| measurements.location(row).to_string()).collect();
+    let far = match far.len().saturating_sub(MAX_HELD_OUT) {
+        _ if far.is_empty() => String::new(),
+        0 => format!(", and {} of the held-out rows", far.join(", ")),
+        more => {
+            format!(", and {} and {more} more of the held-out rows", far[..MAX_HELD_OUT].join(", "))
+        }
     };
     let text = format!(
         "{listed} ({} of {}{far}) contradict the others: without them the nominal arm misses by {} instead of \

@@ -308,8 +308,7 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             && is_of_fixture
             && has_readings.is_none_or(Vec::is_empty)
         {
-            let remedy = BEYOND_PRIOR_FIRST;
-            *finding = finding.clone().with_remedy(remedy.to_owned());
+            *finding = finding.clone().with_remedy(BEYOND_PRIOR_FIRST.to_owned());
         }
         // Remedies that name a cause stay.
         if finding.remedy != finding.code.entry().remedy {
@@ -319,7 +318,6 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             FindingCode::HeldOutBeyondPrediction if are_held_out_wrong => {
                 "correct first the held-out rows that another warning names"
             }
-            FindingCode::NominalFarOff if is_of_fixture => BEYOND_PRIOR_FIRST,
             FindingCode::HeldOutBeyondPrediction if is_beyond_prior => BEYOND_PRIOR_FIRST,
             FindingCode::HeldOutWorse
             | FindingCode::HeldOutNotBetter

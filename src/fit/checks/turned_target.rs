@@ -30,6 +30,17 @@ pub(super) fn turn_of_target(
             shift[axis] = *change;
         }
     }
+    let has = |wanted: usize| {
+        let axis = |&column: &usize| match parameters[column].site {
+            ParameterSite::Target { axis, .. } => Some(axis),
+            _ => None,
+        };
+        columns.iter().filter_map(axis).any(|axis| axis == wanted)
+    };
+    // A held coordinate is not in the change, and β tilts the axis in the frame.
+    if !has(0) || !has(1) || fit.problem.joints.get(joint)?.beta != 0.0 {
+        return None;
+    }
     let radius = |at: &Vector3<f64>| at.xy().norm();
     let beside = (radius(&(at + shift)) - radius(&at)).hypot(shift.z);
     let turns = fit.problem.joints.get(joint)?.command_kind() == JointKind::Revolute;

@@ -208,7 +208,7 @@ pub fn close_by(
     }
     let set_aside = set_aside(&fitted, evidence.as_ref(), &data);
     let is_noise = unexplained.is_empty() && !is_contradicted(&fitted.found);
-    let claims = is_noise.then_some(effects.as_mut_slice());
+    let claims = (is_noise && problem.robust.is_none()).then_some(effects.as_mut_slice());
     let excluded = withhold_claims(&fitted.found, &set_aside, claims);
     let is_noise = is_noise && excluded.is_none();
     let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();

@@ -364,7 +364,14 @@ impl Rows<'_> {
         let place = |k: usize| table.location(rows[k]);
         let stated = self.stated[first];
         let is_held = self.stated[first..=last].iter().all(|other| is_same(*other, stated));
-        let words = if is_sorted(column) {
+        let sorted = |payloads: &[f64]| {
+            let mut payloads = payloads.to_vec();
+            payloads.sort_by(f64::total_cmp);
+            payloads
+        };
+        // Sorting changes the order of the numbers alone.
+        let same = sorted(&payloads).into_iter().zip(sorted(&self.stated));
+        let words = if is_sorted(column) && same.into_iter().all(|(one, of)| is_same(one, of)) {
             "a column of payloads that was sorted by itself, unlike the other columns".to_owned()
         } else if is_held {
             format!(

@@ -24,11 +24,11 @@ const MIN_WRONG_RATIO: f64 = 8.0;
 /// Maximum number of rows that the words list.
 const MAX_LISTED: usize = 4;
 
-/// Rows that are kept with a misreading corrected, by their places among the chosen ones, with the
-/// rms error of the registered nominal arm \[m\].
+/// Rows that are wrong with a misreading corrected, by their places among the chosen ones, with the
+/// rms error of the registered nominal arm at the others \[m\].
 struct Trimmed {
     misreading: Misreading,
-    kept: Vec<usize>,
+    wrong: Vec<usize>,
     error: f64,
 }
 
@@ -129,12 +129,12 @@ impl Trial<'_> {
             trimmed.iter().map(|of| (of.misreading, of.error)).collect();
         let near = near_misreadings(&ranked, as_read);
         let best = trimmed.first().filter(|of| near.contains(&of.misreading))?;
-        let wrong: Vec<usize> =
-            (0..self.chosen.len()).filter(|place| !best.kept.contains(place)).collect();
+        let wrong = best.wrong.clone();
         if wrong.is_empty() {
             return None;
         }
-        let kept = best.kept.iter().map(|&place| self.chosen[place]).collect();
+        let kept = (0..self.chosen.len()).filter(|place| !wrong.contains(place));
+        let kept = kept.map(|place| self.chosen[place]).collect();
         let without = Trial::of_rows(self.fitting, self.problem, kept);
         let explained = without.explained(&near, MAX_EXPLAINED_RATIO * as_read);
         let best = explained.into_iter().next()?;
@@ -182,13 +182,13 @@ impl Trial<'_> {
                 kept.sort_unstable();
             }
             let limit = MIN_WRONG_RATIO * median(lengths.iter().map(|(_, length)| *length))?;
-            let kept: Vec<(usize, f64)> =
-                lengths.into_iter().filter(|(_, length)| *length <= limit).collect();
+            let first_wrong = lengths.partition_point(|(_, length)| *length <= limit);
+            let (kept, wrong) = lengths.split_at(first_wrong);
             let squares: f64 = kept.iter().map(|(_, length)| length.powi(2)).sum();
             let error = (squares / kept.len().max(1) as f64).sqrt();
-            let mut kept: Vec<usize> = kept.into_iter().map(|(row, _)| row).collect();
-            kept.sort_unstable();
-            Some(Trimmed { misreading, kept, error })
+            let mut wrong: Vec<usize> = wrong.iter().map(|(row, _)| *row).collect();
+            wrong.sort_unstable();
+            Some(Trimmed { misreading, wrong, error })
         })
     }
 }
