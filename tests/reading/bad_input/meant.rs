@@ -64,6 +64,7 @@ fn keys_below_the_wrong_line_name_the_right_one() {
         ("xyz_m = [0, 0, 1]", &["place a joint with kind = \"fixed\"", "flexcal init"]),
         ("[data]\nsigma_mm = 0.1", &["unknown key (did you mean position_sigma_mm or "]),
         ("[data]\nsigma = 0.1", &["did you mean position_sigma_mm or "]),
+        ("[parameters]\n'joint1' = { free = true }", &["did you mean \"joint1.*\"?"]),
         (
             "[parameters]\n'joint1.a' = { sigma_percent = 30 }",
             &["not given in percent; write sigma_relative, here sigma_relative = 0.3"],
