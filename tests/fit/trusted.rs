@@ -157,9 +157,9 @@ fn every_reversed_joint_is_named() {
         }
     }
     let found = fit(&problem, &data);
-    let far = found.finding(FindingCode::NominalFarOff).unwrap();
+    let misread = found.finding(FindingCode::Misread).unwrap();
     let words = Misreading::reversed(&reversed).to_string();
-    assert!(far.to_string().contains(&words), "{far}");
+    assert!(misread.to_string().contains(&words), "{misread}");
 }
 
 #[test]

@@ -68,7 +68,9 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(others.map(|unit| Misreading::PositionUnit { unit }));
     let of_table =
         |unit| [true, false].map(|has_targets| Misreading::TableUnit { unit, has_targets });
-    units.extend((0..POSITION_UNITS.len()).flat_map(of_table));
+    // No sheet states lengths of an arm in micrometres.
+    let of_sheet = |unit: &usize| POSITION_UNITS[*unit].1 != "micrometres";
+    units.extend((0..POSITION_UNITS.len()).filter(of_sheet).flat_map(of_table));
     let powers = if lengths(false) { [3, 1] } else { [-3, -2] };
     let of_axis = |axis: usize| powers.map(|power| Misreading::AxisUnit { axis, power });
     units.extend((0..3).flat_map(of_axis));

@@ -286,7 +286,9 @@ impl fmt::Display for Misreading {
                 let rows = if by.abs() == 1 { "row" } else { "rows" };
                 let side = if by > 0 { "before" } else { "after" };
                 write!(f, "positions that belong to the configuration {} {rows} {side}", by.abs())?;
-                if from > 0 { write!(f, ", from row {} of the table on", from + 1) } else { Ok(()) }
+                // Behind it the configuration at `from` is the first with another position.
+                let first = from.saturating_add_signed(isize::from(by.min(0))) + 1;
+                if from > 0 { write!(f, ", from row {first} of the table on") } else { Ok(()) }
             }
             Self::ExchangedAxes => f.write_str("columns u and v that are exchanged"),
             Self::FromBottom => f.write_str(
