@@ -188,7 +188,12 @@ fn unquoted(word: &str, words: &[OsString]) -> Option<String> {
 
 /// Returns the tip for an option that begins with a dash of typeset text; `None` for other words.
 fn long_dash(word: &str) -> Option<String> {
-    let name = word.trim_start_matches(['–', '—', '−']);
+    if !word.starts_with('-') && !word.starts_with(['–', '—', '−'])
+        || !word.contains(['–', '—', '−'])
+    {
+        return None;
+    }
+    let name = word.trim_start_matches(['–', '—', '−', '-']);
     let option = format!("--{name}");
     (name.len() < word.len())
         .then(|| format!("{word:?} begins with a dash of typeset text: write {option}"))

@@ -1,6 +1,7 @@
 //! Errors in the input, each with file, line and key.
 
 mod causes;
+mod clock_offset;
 mod file_format;
 mod kind;
 mod near;
@@ -18,6 +19,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+#[doc(hidden)]
+pub use clock_offset::ClockOffset;
 pub(crate) use file_format::{JSON, TABLE, TOML, XML, binary_format, text_format};
 pub use kind::InputErrorKind;
 pub(crate) use near::{nearest, one_typo};
@@ -26,8 +29,7 @@ pub(crate) use plain::typographic;
 pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
 pub(crate) use study::StudyErrorKind;
 pub(crate) use table::JOINED;
-#[doc(hidden)]
-pub use table::{ClockOffset, TableErrorKind};
+pub use table::TableErrorKind;
 pub(crate) use urdf::UrdfErrorKind;
 #[doc(hidden)]
 pub use warning::WarningKind;

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use super::shortened;
-use super::table::ClockOffset;
 
 /// Returns the plural ending `s` unless `count` is 1.
 pub(super) fn plural(count: usize) -> &'static str {
@@ -216,23 +215,5 @@ pub(super) fn behind_camera_remedy(
 pub(super) fn compared_keys(keys: Option<&[String; 2]>) -> String {
     keys.map_or_else(String::new, |[measured, joints]| {
         format!(" (the measurements have {measured}, the joint table {joints})")
-    })
-}
-
-/// Largest deviation \[h\] from a whole number of hours at which clocks are in two time zones.
-const MAX_OFF_HOUR: f64 = 2e-3;
-
-/// Returns the remedy for clocks that differ; empty without an `offset` that pairs most rows.
-pub(super) fn clock_offset_remedy(offset: Option<ClockOffset>) -> String {
-    offset.map_or_else(String::new, |offset| {
-        let hours = offset.seconds / 3600.0;
-        let is_zone =
-            (0.5..=14.1).contains(&hours.abs()) && (hours - hours.round()).abs() < MAX_OFF_HOUR;
-        let zone = if is_zone { " (by whole hours, as for summer time or UTC)" } else { "" };
-        format!(
-            "; with the clock of the joint table moved by {:?} s the rows have partners: the clocks \
-             differ{zone}, so write {offset} in joints",
-            offset.seconds
-        )
     })
 }

@@ -1,14 +1,14 @@
 //! Errors in tables of measurements.
 
-use std::fmt;
 use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::clock_offset::{ClockOffset, clock_offset_remedy};
 use super::near::{did_you_mean, is_it_rather, suggestion};
 use super::phrases::{
-    clock_offset_remedy, column_difference, compared_keys, decimal_comma_remedy, in_quotes,
-    missing_column_remedy, missing_date_hint, plural, with_remedy,
+    column_difference, compared_keys, decimal_comma_remedy, in_quotes, missing_column_remedy,
+    missing_date_hint, plural, with_remedy,
 };
 use super::warning::{listed, nearest_in_time_hint};
 
@@ -437,24 +437,5 @@ impl TableErrorKind {
             Self::ClocksDiffer { offset, .. } => Some(*offset),
             _ => None,
         }
-    }
-}
-
-/// Offset of the clock of a joint table with which its rows pair with those of the measurements.
-#[doc(hidden)]
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClockOffset {
-    /// Value of `offset_s` \[s\].
-    pub seconds: f64,
-    /// Larger value of `tolerance_s` that the rows need \[s\]; `None` if the present one is enough.
-    pub tolerance: Option<f64>,
-    /// True if so many rows pair so closely that no other pairs are likely.
-    pub is_clear: bool,
-}
-
-impl fmt::Display for ClockOffset {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "offset_s = {:?}", self.seconds)?;
-        self.tolerance.map_or(Ok(()), |tolerance| write!(f, " and tolerance_s = {tolerance}"))
     }
 }

@@ -88,8 +88,27 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
         && word.contains(['/', '*', '^', 'p'])
         && word.chars().all(|c| is_digit(c) || "+-*/^().piPI".contains(c));
     let mistake = |what: &str, remedy| Some((what.to_owned(), remedy));
+    let has_no_value = before.trim_end().ends_with('=')
+        && after.split('#').next().is_some_and(|rest| rest.trim().is_empty());
+    let is_spaced_list = before.contains('[')
+        && after.split([',', ']']).next().is_some_and(|entry| {
+            let mut words = entry.split_whitespace();
+            entry.split_whitespace().count() > 1 && words.all(|word| word.parse::<f64>().is_ok())
+        });
+    let is_open_list = message.contains("missing comma between array")
+        && before.trim().is_empty()
+        && after.contains('=');
     if let Some((what, remedy)) = typographic(word) {
         Some((what, remedy))
+    } else if has_no_value {
+        mistake("the key has no value", "write one behind the =, or delete the line")
+    } else if is_spaced_list {
+        mistake("numbers of a list without commas", "separate them by commas, as in [0.18, 0, 0]")
+    } else if is_open_list {
+        mistake(
+            "a list that begins above is not closed",
+            "write ] at its end, on a line before this one",
+        )
     } else if has_decimal_comma {
         mistake("a decimal comma", "write numbers with a decimal point")
     } else if after.starts_with(['*', '?']) {

@@ -90,8 +90,11 @@ fn numbers_in_a_column_of_times_without_a_unit_are_named() {
             "1742289126",
             "a number of seconds since 1970, 2025-03-18 09:12:06; call the column time_s",
         ),
-        ("45734.383414", "a day number of a spreadsheet, 2025-03-18 09:12:07; format the column"),
-        ("739694.383414", "a day number of MATLAB, 2025-03-18 09:12:07"),
+        (
+            "45734.383414",
+            "a day number of a spreadsheet it is 2025-03-18 09:12:07: then format the",
+        ),
+        ("739694.383414", "as a day number of MATLAB it is 2025-03-18 09:12:07"),
         ("12.5", "a number without a unit; call the column time_s"),
     ] {
         let text = format!(

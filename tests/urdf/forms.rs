@@ -87,7 +87,7 @@ fn placements_and_followers_are_the_same_in_model_and_rig() {
 
     for (wrong, says) in [
         ("kind = 'fixed'\nxyz_m = [0, 0, 1]\nalpha_deg = 3", "joint 2 is placed by xyz_m"),
-        ("xyz_m = [0, 0, 1]", "unknown key"),
+        ("xyz_m = [0, 0, 1]", "does not belong here"),
         ("mimic = { joint = 2 }", "joint 2 cannot follow itself"),
         ("mimic = { joint = 7 }", "no joint 7"),
         (
