@@ -49,7 +49,7 @@ def toml_point(name: str, point: Sequence[float]) -> str:
 
 
 def with_keys(text: str, section: str, values: dict[str, str]) -> str:
-    """The text of a problem with other values of keys of a section, each of which stands on a line of its own or is added."""
+    """The text of a problem with other values of keys of a section, each of which stands on one line or is added."""
     for key, value in values.items():
         head = re.search(rf"^[ \t]*\[[ \t]*{section}[ \t]*\][ \t]*(#.*)?\r?$", text, re.MULTILINE)
         if re.search(rf"^[ \t]*\[[ \t]*{section}[ \t]*\.[ \t]*\"?{key}\"?[ \t]*\]", text, re.MULTILINE):

@@ -59,7 +59,7 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     describe_measured(chain, &[], None)
 }
 
-/// Numbers of corners that stand for a tag, which has its own four.
+/// Numbers of corners that stand for a tag, which has four.
 pub const TAG: [usize; 2] = [1, 1];
 
 /// Converts a chain like [`describe`], with the chains to further tips of the same robot as branches

@@ -199,7 +199,7 @@ impl Rows<'_> {
     }
 
     /// Returns the mistakes of the column, those that agree best with the payloads that were `found`
-    /// first. If the misfit `is_clear`, mistakes with numbers of their own follow.
+    /// first. If the misfit `is_clear`, mistakes with other numbers follow.
     fn ranked(
         &self,
         table: &Measurements,
