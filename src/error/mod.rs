@@ -29,6 +29,7 @@ pub(crate) use plain::typographic;
 pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
 pub(crate) use study::StudyErrorKind;
 pub(crate) use table::JOINED;
+#[doc(hidden)]
 pub use table::TableErrorKind;
 pub(crate) use urdf::UrdfErrorKind;
 #[doc(hidden)]

@@ -92,7 +92,9 @@ fn separated(
 fn is_formula(word: &str) -> bool {
     const SIGNS: [char; 10] = ['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠'];
     let start = word.trim_start_matches('\'');
-    start.starts_with(SIGNS) && start.parse::<f64>().is_err()
+    // Tables with another decimal mark have numbers with a comma.
+    let is_number = start.replacen(',', ".", 1).parse::<f64>().is_ok();
+    start.starts_with(SIGNS) && !is_number
 }
 
 /// Escapes a word that a spreadsheet would run as a formula, by an apostrophe in front.
@@ -117,7 +119,7 @@ mod tests {
             assert_eq!(escaped, format!("'{word}"));
             assert_eq!(unescape_cell(&escaped), word);
         }
-        for word in ["-1.5", "+2e-3", "-inf", "'quoted", "x=1", "", "'", "2024-05-31"] {
+        for word in ["-1.5", "-32,015", "+2e-3", "-inf", "'quoted", "x=1", "", "'", "2024-05-31"] {
             assert_eq!(escape_cell(word.to_owned()), word);
             assert_eq!(unescape_cell(word), word);
         }
