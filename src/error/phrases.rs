@@ -31,6 +31,9 @@ pub(super) fn path_hint(path: &Path) -> &'static str {
     if text.contains(['*', '?']) {
         return "; a name is no pattern, so list each file by its name";
     }
+    if text.split('/').any(|part| part == "~") {
+        return "; ~ stands for no folder in a file, so write the whole path";
+    }
     if text.contains("file:/") || text.contains("http:/") || text.contains("https:/") {
         return "; an address names no file, so write a path without it";
     }

@@ -73,6 +73,9 @@ impl Item<'_, '_> {
             ("a table, { key = value }", DeValue::Integer(_)) if self.key.starts_with("effect") => {
                 Some(write(&format!("{{ joint = {} }}", self.written_number()?)))
             }
+            ("a table, { key = value }", DeValue::Integer(_)) if name == "mimic" => {
+                Some(write(&format!("{{ joint = {}, ratio = 1 }}", self.written_number()?)))
+            }
             ("text in quotes", _) if name == "link" => {
                 let names = self.names_of("joint", &["beam", "name"]);
                 let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();

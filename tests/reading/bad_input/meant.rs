@@ -26,6 +26,7 @@ fn values_of_another_type_are_shown_as_they_are_written() {
         ("[tool]\njoint = 'nest'", &["write the number of the joint, counted from 1"]),
         ("min_deg = [-10, 20]", &["write min_deg = -10 and max_deg = 20"]),
         ("[parameters]\n'base.*' = { free = 1 }", &["found a number; write free = true"]),
+        ("mimic = 2", &["write mimic = { joint = 2, ratio = 1 }"]),
         ("[[effect]]\ngear-ratio = 1", &["write gear-ratio = { joint = 1 }"]),
         ("[data]\nheld_out = { fraction = 30 %, seed = 1 }", &["a percentage", "write a fraction"]),
         ("[data]\nheld_out = { fraction = 30, seed = 1 }", &["write 0.3 for 30 %"]),
