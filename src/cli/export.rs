@@ -334,6 +334,19 @@ fn check_poses(
     Ok(())
 }
 
+/// Checks that there is one tool with a known orientation, so that its pose may be that of a link.
+///
+/// # Errors
+/// Returns an error otherwise.
+fn check_tool(problem: &Problem, model: &Model) -> Result<(), code::ExportError> {
+    let mut names = model.parameters.iter().map(|parameter| parameter.name.as_str());
+    if names.clone().any(|name| name.starts_with("tool[")) {
+        return Err(code::ExportError::SeveralTools);
+    }
+    let is_turned = problem.tool.rotation.norm() > 0.0 || names.any(|name| name == "tool.rx");
+    if is_turned { Ok(()) } else { Err(code::ExportError::ToolNotTurned) }
+}
+
 /// Formats the arm or a camera in the format of the arguments. Adds the table of standard
 /// Denavit-Hartenberg parameters to the `remarks`.
 fn render(
@@ -346,6 +359,9 @@ fn render(
         let robot = Robot::read(file)?;
         let chain = Chain::from_problem(&robot, problem)?;
         let mut mounted = mounted_links(problem, model, x.as_slice());
+        if arguments.tool_link.is_some() {
+            check_tool(problem, model)?;
+        }
         let target = |link: &String| mounted_target(problem, model, x.as_slice(), link);
         mounted.extend(arguments.tool_link.as_ref().map(target));
         let export = export_with_links(&chain, problem, arm, &mounted)?;

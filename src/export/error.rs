@@ -8,6 +8,17 @@ use crate::measurement::DatasetError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
+    /// The orientation of the tool, whose pose is to be written to a link, is not known.
+    #[error(
+        "--tool-link writes a pose, and the orientation of the tool was neither fitted \
+         (orientation_sigma_deg in [data]) nor declared (rotation_deg in [tool])"
+    )]
+    ToolNotTurned,
+    /// Sessions or targets have different tools.
+    #[error(
+        "--tool-link writes one pose, and the sessions or targets of the estimate have different ones"
+    )]
+    SeveralTools,
     /// The measurements do not determine the pose of a camera or a marker.
     #[error(
         "the measurements do not determine {coordinates} of {fixture}, so that its pose in \

@@ -187,6 +187,12 @@ fn the_link_of_a_camera_takes_the_pose_that_other_poses_give() {
     let table = folder.flexcal("export p --estimate fit/estimate.json --format mdh").success();
     assert_contains(&table.words(), &["= open: the rows do not determine it"]);
     assert_contains(&table.message(), &["not to be relied upon alone"]);
+    // Positions alone do not tell how a tool is turned.
+    folder.simulate("p", "all.toml", 40, 1, "p/measurements.csv");
+    folder.edit("p/problem.toml", "orientation_sigma_deg = 0.02\n", "");
+    folder.flexcal("identify p --out fit --force --quiet").success();
+    let run = folder.flexcal(&format!("{export} --force --tool-link camera_optical_frame")).code(2);
+    assert_contains(&run.message(), &["neither fitted", "nor declared"]);
 }
 
 #[test]
