@@ -45,12 +45,15 @@ impl Forest<'_> {
         kept.sort_unstable();
         let shown: Vec<&Row> = kept.iter().map(|&k| &self.rows[k]).collect();
         let values = || shown.iter().flat_map(|row| row.1.iter().flatten());
-        // On a logarithmic axis an interval that reaches 0 ends at the smallest value.
-        let least = values().map(|value| value.0).filter(|value| *value > 0.0);
-        let least = least.fold(f64::INFINITY, f64::min);
+        let smallest = values().map(|value| value.0).filter(|value| *value > 0.0);
+        let smallest = smallest.fold(f64::INFINITY, f64::min);
+        let ends = || values().flat_map(|(value, error)| [value - error, value + error]);
+        // A logarithmic axis begins at the lowest end of an interval, at most a decade below the
+        // smallest value; intervals that reach 0 end there.
+        let shown_ends = ends().filter(|end| *end >= 0.1 * smallest);
+        let least = shown_ends.fold(smallest, f64::min);
         let along = |value: f64| if self.is_logarithmic { value.max(least).log10() } else { value };
-        let ends = values().flat_map(|(value, error)| [value - error, value + error]);
-        let (low, high) = range(ends.chain(self.references.iter().copied()).map(along));
+        let (low, high) = range(ends().chain(self.references.iter().copied()).map(along));
         if shown.is_empty() || !(low.is_finite() && high.is_finite()) {
             return None;
         }
