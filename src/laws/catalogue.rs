@@ -12,9 +12,9 @@ use super::family::{At, Chance, Family, Need, Only, Prior, Search, TermEntry};
 use super::law::{FOCAL, LAW, Law};
 use super::site::{ArmField, BeamField, JointField};
 use super::sizes::{
-    DRIFT_SIGMA, EXPOSURE_DELAY_SIGMA, FLEXIBILITY_SIGMA, LENS_DRIFT_SIGMA, LENS_SAG_SIGMA,
-    MAX_TURN, PAYLOAD_SHIFT_SIGMA, READING_SHIFT_SIGMA, RELATIVE_SIGMA, ROW_TIME_SIGMA,
-    SETUP_SHIFT_SIGMA,
+    ARM_STRAIN_SIGMA, DRIFT_SIGMA, EXPOSURE_DELAY_SIGMA, FLEXIBILITY_SIGMA, LENS_DRIFT_SIGMA,
+    LENS_SAG_SIGMA, MAX_TURN, PAYLOAD_SHIFT_SIGMA, READING_SHIFT_SIGMA, RELATIVE_SIGMA,
+    ROW_TIME_SIGMA, SETUP_SHIFT_SIGMA,
 };
 
 /// Returns the key of an argument: the name of its field, or the text after `as`.
@@ -262,6 +262,13 @@ catalogue! {
         needs: &[Need::Temperature],
         ..Family::PLAIN
     };
+    /// Thermal expansion of the whole arm but its tool: lengths a, d and xyz grow by ε (T − T₀).
+    ArmThermalExpansion "arm-thermal-expansion" => Family {
+        terms: &[TermEntry::driven(At::ArmStrain, "strain", "T", ARM_STRAIN_SIGMA)],
+        says: "the arm grows with temperature",
+        needs: &[Need::Temperature],
+        ..Family::PLAIN
+    };
     /// Thermal bending of a beam with a lagged temperature T̃: curvature (`k_y`, `k_z`)·(T̃ − T₀).
     LinkThermalBendingLag "link-thermal-bending-lag" { link: String = Beam, time_constant: f64 = Duration as "time_constant_s" } => Family {
         terms: &[
@@ -338,8 +345,7 @@ catalogue! {
         only: &[Only::Hoisted],
         ..Family::PLAIN
     };
-    /// Compliance of the base: it rotates by (`C_x` `M_x`, `C_y` `M_y`, 0) under the moments at the
-    /// base.
+    /// Compliance of the base: it rotates by (`C_x` `M_x`, `C_y` `M_y`, 0) under its moments.
     BaseCompliance "base-compliance" => Family {
         terms: &[
             TermEntry::at(At::Arm(ArmField::MountingX), "about_x", 1e-4).never_negative(),

@@ -139,6 +139,8 @@ pub enum At {
     /// Small motion of the tool in the frame of the joint that it is mounted on: x, y, z, rx, ry,
     /// rz.
     Tool(usize),
+    /// Strain of the arm: all its lengths (a, d, xyz of placements) grow in proportion.
+    ArmStrain,
     /// Relative error of every measured coordinate.
     Scale,
     /// Entry of the strain of the measuring frame, by its index: xx, yy, zz, xy, xz, yz.

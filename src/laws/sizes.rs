@@ -3,6 +3,8 @@
 /// Prior σ of a coefficient that adds to a joint's coordinate \[rad\] or \[m\], or to a beam's
 /// strain or curvature [1/m], per unit of the formula that it multiplies.
 pub(super) const DRIFT_SIGMA: f64 = 1e-3;
+/// Prior σ of the thermal strain of a whole arm [1/K]; aluminium grows by 24e-6.
+pub(super) const ARM_STRAIN_SIGMA: f64 = 3e-5;
 /// Prior σ of a relative error, such as that of a transmission ratio or of a scale.
 pub(super) const RELATIVE_SIGMA: f64 = 0.01;
 /// Prior σ of a displacement of the instrument's readings \[m\].

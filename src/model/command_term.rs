@@ -5,6 +5,9 @@ use crate::model::parameter::{
 };
 use crate::problem::{Mimic, Problem};
 
+use super::sites::lengths;
+use crate::mechanics::Arm;
+
 /// Quantity that a term adds to: a joint coordinate, a beam's strain or a small motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TermSite {
@@ -51,15 +54,29 @@ impl CommandTerm {
         terms.collect()
     }
 
-    /// Returns the fixed terms and, after them, the terms of the free parameters at the full
-    /// parameter vector `x`.
-    pub fn fixed_and_free(fixed: &[Self], parameters: &[Parameter], x: &[f64]) -> Vec<Self> {
-        let free = (0..parameters.len()).filter_map(|k| {
-            let site = TermSite::of(parameters[k].site)?;
-            let regressor = value_regressor(parameters, x, k)?;
-            (!regressor.is_constant()).then(|| Self { site, regressor, value: x[k] })
-        });
-        fixed.iter().cloned().chain(free).collect()
+    /// Returns the fixed terms and, after them, the terms of the free parameters of `arm` at the
+    /// full parameter vector `x`.
+    pub fn fixed_and_free(
+        fixed: &[Self],
+        arm: &Arm<f64>,
+        parameters: &[Parameter],
+        x: &[f64],
+    ) -> Vec<Self> {
+        let mut terms = fixed.to_vec();
+        for (k, &value) in x.iter().enumerate().take(parameters.len()) {
+            let site = parameters[k].site;
+            let regressor = || value_regressor(parameters, x, k).filter(|of| !of.is_constant());
+            if site == ParameterSite::ArmStrain {
+                let lengthened = |(joint, which, length)| {
+                    let site = TermSite::Motion { joint, which };
+                    Some(Self { site, regressor: regressor()?, value: value * length })
+                };
+                terms.extend(lengths(arm).filter_map(lengthened));
+            } else if let Some(site) = TermSite::of(site) {
+                terms.extend(regressor().map(|regressor| Self { site, regressor, value }));
+            }
+        }
+        terms
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::command_term::{CommandTerm, TermSite};
 use super::harmonic_sum::HarmonicSum;
+use crate::mechanics::Arm;
 use crate::model::parameter::{Parameter, ParameterSite, Regressor, Waves};
 use crate::problem::{JointOffsets, PoseView};
 
@@ -21,10 +22,10 @@ pub(super) struct CommandTerms {
 }
 
 impl CommandTerms {
-    /// Creates the sum of the fixed terms and of the free parameters at the full parameter vector
-    /// `x`.
-    pub fn new(fixed: &[CommandTerm], parameters: &[Parameter], x: &[f64]) -> Self {
-        let mut others = CommandTerm::fixed_and_free(fixed, parameters, x);
+    /// Creates the sum of the fixed terms and of the free parameters of `arm` at the full parameter
+    /// vector `x`.
+    pub fn new(fixed: &[CommandTerm], arm: &Arm<f64>, parameters: &[Parameter], x: &[f64]) -> Self {
+        let mut others = CommandTerm::fixed_and_free(fixed, arm, parameters, x);
         let series = HarmonicSum::take_from(&mut others);
         let exposure = |(parameter, &time): (&Parameter, &f64)| match parameter.site {
             ParameterSite::Exposure { camera, by_row } => Some((camera, by_row, time)),
@@ -102,7 +103,7 @@ mod tests {
             .chain(others)
             .map(|(site, regressor, value)| CommandTerm { site, regressor, value })
             .collect();
-        let mut commands = CommandTerms::new(&terms, &[], &[]);
+        let mut commands = CommandTerms::new(&terms, &Arm::nominal(&problem), &[], &[]);
         assert!(commands.series.len() == 2 && commands.others.len() == 3);
         // The two poses show whether strains of one pose remain in the next.
         for configuration in [[0.3, -1.2], [0.9, 0.4]] {

@@ -22,6 +22,7 @@ impl Model {
             nominal: arm,
             fixed_terms: CommandTerm::fixed_and_free(
                 &self.fixed_terms,
+                &self.nominal,
                 &self.parameters_at(x.as_slice()),
                 x.as_slice(),
             ),

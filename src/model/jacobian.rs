@@ -86,6 +86,7 @@ impl<'m> JacobianWriter<'m> {
                 ParameterSite::Joint { .. }
                 | ParameterSite::Beam { .. }
                 | ParameterSite::Exposure { .. }
+                | ParameterSite::ArmStrain
                 | ParameterSite::Arm(_) => {}
             }
         }

@@ -256,7 +256,7 @@ impl Model {
     /// Returns the terms that add to the joints' commands, strains and small motions at the full
     /// parameter vector `x`.
     fn commands(&self, x: &[f64]) -> CommandTerms {
-        CommandTerms::new(&self.fixed_terms, &self.parameters_at(x), x)
+        CommandTerms::new(&self.fixed_terms, &self.nominal, &self.parameters_at(x), x)
     }
 
     /// Returns the errors of the instrument and the rotations of the bases at the full parameter

@@ -81,11 +81,15 @@ impl Model {
             };
             PartTerm { site, regressor, value }
         };
-        let mut terms: Vec<PartTerm> =
-            CommandTerm::fixed_and_free(&self.fixed_terms, &self.parameters_at(x), x)
-                .into_iter()
-                .map(of_joint)
-                .collect();
+        let mut terms: Vec<PartTerm> = CommandTerm::fixed_and_free(
+            &self.fixed_terms,
+            &self.nominal,
+            &self.parameters_at(x),
+            x,
+        )
+        .into_iter()
+        .map(of_joint)
+        .collect();
         let instrument = self.instrument_at(x);
         let [shifts, rotations] = instrument.terms();
         terms.extend(shifts.iter().map(|(axis, regressor, value)| PartTerm {

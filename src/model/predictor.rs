@@ -65,7 +65,7 @@ impl<'m> Predictor<'m> {
 
     /// Creates a predictor of the geometry alone: rigid links and joints, no effects on the arm.
     pub fn rigid(model: &'m Model, x: &[f64]) -> Self {
-        let commands = CommandTerms::new(&model.fixed_terms, &[], &[]);
+        let commands = CommandTerms::new(&model.fixed_terms, &model.nominal, &[], &[]);
         Self { is_rigid: true, commands, ..Self::new(model, x) }
     }
 

@@ -4,8 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Model;
 use super::load_moments::JacobianColumn;
+use super::sites::lengths;
 use crate::least_squares::Block;
-use crate::model::parameter::{ParameterSite, Regressor, Waves};
+use crate::model::parameter::{JointField, ParameterSite, Regressor, Waves};
 use crate::problem::PoseView;
 
 /// Three rows of a block that receive the derivatives of one predicted vector.
@@ -57,8 +58,8 @@ impl Rows<'_> {
     pub fn put_input(&mut self, input: &Input, commanded: &PoseView, derivative: &Vector3<f64>) {
         self.put_if(input.column, || *derivative);
         let mut waves = Waves::default();
-        for (column, regressor) in &input.regressors {
-            self.add(*column, &(derivative * waves.value(regressor, commanded)));
+        for (column, factor, regressor) in &input.regressors {
+            self.add(*column, &(derivative * (factor * waves.value(regressor, commanded))));
         }
     }
 }
@@ -79,9 +80,9 @@ pub(super) struct Input {
     pub parameter: Option<usize>,
     /// Jacobian column of that parameter; `None` if there is none.
     pub column: Option<usize>,
-    /// Jacobian columns of the parameters that add to the scalar, each with the regressor that
-    /// multiplies it.
-    pub regressors: Vec<(usize, Regressor)>,
+    /// Jacobian columns of the parameters that add to the scalar, each with the factor and the
+    /// regressor that multiply it.
+    pub regressors: Vec<(usize, f64, Regressor)>,
 }
 
 /// Returns the inputs of the arm that the parameters of these Jacobian columns act on.
@@ -100,7 +101,17 @@ pub(super) fn inputs(model: &Model, columns: &[JacobianColumn]) -> Vec<Input> {
             for joint in 0..model.joints() {
                 let index = input_at(&mut inputs, model.coordinate(joint));
                 let regressor = Regressor::Exposure { camera, joint, by_row };
-                inputs[index].regressors.push((index_of_column, regressor));
+                inputs[index].regressors.push((index_of_column, 1.0, regressor));
+            }
+            continue;
+        }
+        // A strain of the arm acts on all its lengths.
+        if site == ParameterSite::ArmStrain {
+            for (joint, axis, length) in lengths(&model.nominal) {
+                let site = ParameterSite::Joint { joint, field: JointField::Before(axis) };
+                let index = input_at(&mut inputs, site);
+                let regressor = column.regressor.clone();
+                inputs[index].regressors.push((index_of_column, length, regressor));
             }
             continue;
         }
@@ -116,7 +127,7 @@ pub(super) fn inputs(model: &Model, columns: &[JacobianColumn]) -> Vec<Input> {
         if column.regressor.is_constant() {
             (input.parameter, input.column) = (column.parameter, Some(index_of_column));
         } else {
-            input.regressors.push((index_of_column, column.regressor.clone()));
+            input.regressors.push((index_of_column, 1.0, column.regressor.clone()));
         }
     }
     inputs

@@ -1,13 +1,13 @@
 //! Sites of parameters in the arm.
 
 use crate::mechanics::{
-    AddedMass, Angle, Arm, Beam, Compensator, Flexibility, HoistError, Nonlinear, Strain,
+    AddedMass, Angle, Arm, Beam, Compensator, Flexibility, HoistError, Nonlinear, Placement, Strain,
 };
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::{Argument, Effect};
 use crate::scalar::Scalar;
 use crate::spatial::rotate;
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 
 /// Creates the part of the arm that a parameter at `site` needs, if it is absent. With the
 /// parameter at `nominal`, the arm behaves as without this part.
@@ -63,6 +63,10 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
             | ArmField::GravityX
             | ArmField::GravityY => {}
         },
+        ParameterSite::ArmStrain => {
+            let joints = arm.joints.iter_mut();
+            joints.for_each(|joint| _ = joint.motion.get_or_insert_with(Box::default));
+        }
         ParameterSite::Base { .. }
         | ParameterSite::Target { .. }
         | ParameterSite::Fixture { .. }
@@ -73,6 +77,20 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
         | ParameterSite::Scale
         | ParameterSite::Strain { .. } => {}
     }
+}
+
+/// Returns the small motions by which a strain of the arm lengthens it: index of the joint, axis
+/// (0 to 2) of the translation before it turns, and length \[m\] that the strain multiplies.
+pub(super) fn lengths(arm: &Arm<f64>) -> impl Iterator<Item = (usize, usize, f64)> {
+    arm.joints.iter().enumerate().flat_map(|(index, joint)| {
+        let mut length = Vector3::new(joint.a, 0.0, joint.d);
+        if let Some(Placement { xyz, rpy }) = &joint.placement {
+            let [roll, pitch, yaw] = [rpy[0].value, rpy[1].value, rpy[2].value];
+            length += Rotation3::from_euler_angles(roll, pitch, yaw).inverse() * xyz;
+        }
+        let axes = (0..3).filter(move |&axis| length[axis] != 0.0);
+        axes.map(move |axis| (index, axis, length[axis]))
+    })
 }
 
 /// Adds the gravity compensator that an effect declares, with zero spring force, unless the joint
@@ -173,6 +191,7 @@ pub(super) fn set_site<S: Scalar>(
         | ParameterSite::Shift { .. }
         | ParameterSite::Turn { .. }
         | ParameterSite::Exposure { .. }
+        | ParameterSite::ArmStrain
         | ParameterSite::Scale
         | ParameterSite::Strain { .. } => {}
     }

@@ -23,19 +23,21 @@ impl Rig {
             let number = index + 1;
             chain
                 .continue_from(joint.parent.and_then(|parent| frames.get(parent)).unwrap_or(&base));
+            let growth = self.growth(conditions);
             if let Some(Placement { xyz, rpy }) = &joint.placement {
-                chain.end().translate(xyz);
+                chain.end().translate(&(xyz * (1.0 + growth)));
                 chain.end().rotate_z(rpy.z.sin_cos());
                 chain.end().rotate_y(rpy.y.sin_cos());
                 chain.end().rotate_x(rpy.x.sin_cos());
             }
             chain.end().rotate_x(joint.alpha.sin_cos());
             self.add_link(joint, number, &gravity, conditions, &mut chain);
+            chain.end().translate_x(growth * joint.a);
             let (lateral, about_axis) = self.joint_hinges(joint, number, conditions);
             chain.add_hinge(lateral);
             let before = self.moved_by_laws(conditions, At::Before, Some(number));
             *chain.end() = chain.end().compose(&before);
-            let (mut turn, mut slide) = (joint.theta, joint.d);
+            let (mut turn, mut slide) = (joint.theta, joint.d * (1.0 + growth));
             let command =
                 |joint: usize| conditions.configuration.get(joint).copied().unwrap_or(0.0);
             let q = joint
@@ -86,6 +88,15 @@ impl Rig {
             _ => gravity,
         };
         self.effect_values().fold(self.arm.gravity, turn)
+    }
+
+    /// Returns the strain of all lengths of the arm in a pose.
+    fn growth(&self, conditions: &PoseConditions) -> f64 {
+        let strain = |effect: EffectValues<'_>| match effect {
+            (Effect::ArmThermalExpansion, &[strain]) => strain * self.warming(conditions),
+            _ => 0.0,
+        };
+        self.effect_values().map(strain).sum()
     }
 
     /// Returns the hinge between the ground and the arm's base.

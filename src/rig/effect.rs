@@ -143,9 +143,9 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         Effect::LinkThermalBending { .. } | Effect::LinkThermalBendingLag { .. } => {
             named(&[("about_y", Unit::CurvaturePerDegree), ("about_z", Unit::CurvaturePerDegree)])
         }
-        Effect::LinkThermalExpansion { .. } | Effect::LinkThermalExpansionLag { .. } => {
-            named(&[("strain", Unit::PerDegree)])
-        }
+        Effect::ArmThermalExpansion
+        | Effect::LinkThermalExpansion { .. }
+        | Effect::LinkThermalExpansionLag { .. } => named(&[("strain", Unit::PerDegree)]),
         Effect::UnmodelledMass { .. } => named(&[("mass", Unit::Mass), ("at", Unit::Length)]),
         Effect::PayloadMass | Effect::BodyMass { .. } => named(&[("mass", Unit::Mass)]),
         Effect::HoistDirection => {

@@ -30,6 +30,7 @@ pub fn of_lunar_sampler() -> Vec<Strong> {
         (Effect::TwistBending { link: link() }, vec![2e-6, -3e-6]),
         (Effect::LinkThermalBending { link: link() }, vec![1e-5, 2e-5]),
         (Effect::LinkThermalExpansion { link: link() }, vec![12e-6]),
+        (Effect::ArmThermalExpansion, vec![23e-6]),
         (Effect::LinkThermalBendingLag { link: link(), time_constant: 150.0 }, vec![1e-5, -2e-5]),
         (Effect::LinkThermalExpansionLag { link: link(), time_constant: 400.0 }, vec![12e-6]),
         (Effect::UnmodelledMass { link: link() }, vec![0.4, 0.8]),

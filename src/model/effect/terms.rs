@@ -105,6 +105,7 @@ impl Effect {
                 let joint = problem.tool.joint.min(problem.joints.len().checked_sub(1)?);
                 ParameterSite::Joint { joint, field: JointField::After(axis) }
             }
+            At::ArmStrain => ParameterSite::ArmStrain,
             At::Scale => ParameterSite::Scale,
             At::Strain(entry) => ParameterSite::Strain { entry },
             At::Exposure { by_row } => {

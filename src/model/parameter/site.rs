@@ -81,6 +81,9 @@ pub enum ParameterSite {
         /// True for the time per row of the image, false for that of its first row.
         by_row: bool,
     },
+    /// Strain of the arm: all lengths a, d and xyz of placements grow in proportion; its parameter
+    /// always has a regressor.
+    ArmStrain,
     /// Relative scale error s of the instrument: a position p reads as p (1 + s).
     Scale,
     /// Entry of the strain E of the measuring frame: p reads as p + E p. E is triangular, in the
@@ -158,7 +161,7 @@ impl ParameterSite {
                 kind.unit(axis)
             }
             Self::Exposure { .. } => Unit::Time,
-            Self::Scale | Self::Strain { .. } => Unit::Ratio,
+            Self::ArmStrain | Self::Scale | Self::Strain { .. } => Unit::Ratio,
         }
     }
 
@@ -179,6 +182,7 @@ impl ParameterSite {
             | Self::Shift { .. }
             | Self::Turn { .. }
             | Self::Exposure { .. }
+            | Self::ArmStrain
             | Self::Scale
             | Self::Strain { .. } => false,
         }

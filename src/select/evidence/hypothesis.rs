@@ -51,6 +51,7 @@ impl Site {
                     Field::Mixing => Self::Arm,
                 }
             }
+            ParameterSite::ArmStrain => Self::Arm,
             ParameterSite::Base { .. } | ParameterSite::Turn { .. } => Self::Base,
             ParameterSite::Target { .. } => Self::Payload,
             ParameterSite::Fixture { .. }
