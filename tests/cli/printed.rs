@@ -69,7 +69,7 @@ fn arms(folder: &Folder) -> Vec<[String; 2]> {
         let mut data = path("problems").join(arm).join("measurements.csv");
         if !data.is_file() {
             data = folder.path(format!("{arm}.csv"));
-            folder.simulate(&problem, &problem, 80, 1, &format!("{arm}.csv"));
+            folder.simulate(&problem, &problem, 48, 1, &format!("{arm}.csv"));
         }
         arms.push([problem, data.display().to_string()]);
     }
