@@ -1,4 +1,4 @@
-//! Masses and payloads that are not as declared, as causes.
+//! Masses and payloads that are not as declared, and thermal expansion of the whole arm, as causes.
 
 use std::fs;
 use std::path::Path;
@@ -14,15 +14,17 @@ use nalgebra::Vector3;
 const POSES: &str = "[random]\n'joint*.*' = { sigma_deg = 0.05, sigma_mm = 0.5, sigma_relative = 0.1 }\n\
     'tool.*' = { sigma_mm = 1 }\n[noise]\nposition_sigma_mm = 0.05\n[poses]\nq1_deg = [-160, 160]\n\
     q2_deg = [-150, -10]\nq3_deg = [-80, 150]\nq4_deg = [-170, 170]\nq5_deg = [-110, 110]\n\
-    q6_deg = [-350, 350]\npayload_kg = [0, 12, 25]\n";
+    q6_deg = [-350, 350]\npayload_kg = [0, 12, 25]\ntemperature_C = [15, 35]\n";
 
 #[test]
-fn wrong_masses_and_a_payload_elsewhere_are_named() {
+fn wrong_masses_a_payload_elsewhere_and_an_arm_that_grows_are_named() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/honest/six.toml");
-    let problem = Problem::parse(&fs::read_to_string(&path).unwrap(), &path).unwrap();
+    let mut problem = Problem::parse(&fs::read_to_string(&path).unwrap(), &path).unwrap();
+    problem.data.reference_temperature = Some(20.0);
     for (name, effect) in [
         ("body-mass", "body-mass = { joint = 4 }\nmass_kg = 8"),
         ("payload-position", "payload-position = true\nx_m = 0.1\ny_m = -0.05\nz_m = 0.15"),
+        ("arm-thermal-expansion", "arm-thermal-expansion = true\nstrain_per_C = 2.3e-5"),
     ] {
         let truth = format!("[[effect]]\n{effect}\n{POSES}");
         let truth = Truth::parse(&truth, Path::new("TRUTH.toml"), &problem).unwrap();

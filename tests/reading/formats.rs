@@ -188,6 +188,7 @@ fn every_effect_has_its_arguments() {
             "link-thermal-expansion = { link = 'A' }",
             Effect::LinkThermalExpansion { link: "A".into() },
         ),
+        ("arm-thermal-expansion = true", Effect::ArmThermalExpansion),
         ("unmodelled-mass = { link = 'A' }", Effect::UnmodelledMass { link: "A".into() }),
         ("payload-mass = {}", Effect::PayloadMass),
         ("hoist-force = true", Effect::HoistForce),
