@@ -113,6 +113,12 @@ impl Location {
         Self { excerpt: None, ..self.clone() }.with_key(key)
     }
 
+    /// Returns the location of the whole line.
+    #[must_use]
+    pub(crate) fn of_line(&self) -> Self {
+        Self { key: None, excerpt: None, ..self.clone() }
+    }
+
     /// Returns an error at this location.
     pub(crate) fn error(self, kind: impl Into<InputErrorKind>) -> InputError {
         InputError { location: Box::new(self), kind: Box::new(kind.into()) }

@@ -2,8 +2,9 @@
 
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
+use super::row_kind::listed;
 use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
 use crate::least_squares::solver::AtBound;
 
@@ -12,36 +13,30 @@ use crate::least_squares::solver::AtBound;
 const MAX_NAMED_PARTNERS: usize = 5;
 
 /// Checks that no parameter is at a bound that hides the uncertainty of other parameters.
-pub(super) struct BoundsAreSeen;
-
-impl Check for BoundsAreSeen {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let parameters: Vec<_> = fit.whole.parameters().collect();
-        let finding = |valley: &HiddenByBound| {
-            let HiddenByBound { unknown, side, deviation, direction, partners } = valley;
-            let (parameter, side) = (
-                parameters[*unknown],
-                match side {
-                    AtBound::Lower => "lower",
-                    AtBound::Upper => "upper",
-                },
-            );
-            let name = &parameter.name;
-            let mut names: Vec<&str> = Vec::new();
-            let mut order = partners.clone();
-            order.sort_by(|&a, &b| direction[b].abs().total_cmp(&direction[a].abs()));
-            names.extend(order.iter().map(|&k| parameters[k].name.as_str()));
-            let more = names.len().saturating_sub(MAX_NAMED_PARTNERS);
-            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            let first = names[..names.len().min(MAX_NAMED_PARTNERS)].join(", ");
-            let text = format!(
-                "{name} rests on its {side} bound; the data hardly determine more than one \
-                 combination of it with {first}{more}, and standard errors allow for all values of \
-                 {name} within its bounds"
-            );
-            let numbers = [json!(name), side.into(), (*deviation).into(), json!(names)];
-            Finding::new(FindingCode::BoundInUnidentifiedDirection, numbers, text)
-        };
-        fit.hidden.iter().map(finding).collect()
-    }
+pub(super) fn bounds_are_seen(fit: &CheckedFit) -> Vec<Finding> {
+    let parameters: Vec<_> = fit.whole.parameters().collect();
+    let finding = |valley: &HiddenByBound| {
+        let HiddenByBound { unknown, side, deviation, direction, partners } = valley;
+        let (parameter, side) = (
+            parameters[*unknown],
+            match side {
+                AtBound::Lower => "lower",
+                AtBound::Upper => "upper",
+            },
+        );
+        let name = &parameter.name;
+        let mut names: Vec<&str> = Vec::new();
+        let mut order = partners.clone();
+        order.sort_by(|&a, &b| direction[b].abs().total_cmp(&direction[a].abs()));
+        names.extend(order.iter().map(|&k| parameters[k].name.as_str()));
+        let first = listed(&names, MAX_NAMED_PARTNERS);
+        let text = format!(
+            "{name} rests on its {side} bound; the data hardly determine more than one \
+             combination of it with {first}, and standard errors allow for all values of \
+             {name} within its bounds"
+        );
+        let numbers = [json!(name), side.into(), (*deviation).into(), json!(names)];
+        Finding::new(FindingCode::BoundInUnidentifiedDirection, numbers, text)
+    };
+    fit.hidden.iter().map(finding).collect()
 }

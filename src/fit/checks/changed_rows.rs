@@ -12,8 +12,9 @@ use rayon::prelude::*;
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
+use super::row_kind::listed;
 use super::row_steps::{Linear, MIN_ROWS, Place, Places, Step};
 use super::turned_target::turn_of_target;
 use crate::fit::uncertainty::noise::Noise;
@@ -54,23 +55,19 @@ const RANDOM_ORDERS: usize = 19;
 const SEED: u64 = 1;
 
 /// Checks that no place of the model is different from a certain row on.
-pub(super) struct RowsStayAlike;
-
-impl Check for RowsStayAlike {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let kinds = fit.kinds();
-        let positions = kinds.iter().all(|kind| kind.observation.is_position());
-        let images = kinds.iter().all(|kind| kind.observation.point().is_some());
-        let is_asked = fit.noise == Noise::Declared
-            && fit.noise_factor >= MIN_NOISE_FACTOR
-            && fit.has_further_fits
-            && fit.fitting.loss == Loss::Squares
-            && fit.fitting.earlier.is_none();
-        if !(positions || images) || !is_asked {
-            return Vec::new();
-        }
-        changed(fit, images).into_iter().collect()
+pub(super) fn rows_stay_alike(fit: &CheckedFit) -> Option<Finding> {
+    let kinds = fit.kinds();
+    let positions = kinds.iter().all(|kind| kind.observation.is_position());
+    let images = kinds.iter().all(|kind| kind.observation.point().is_some());
+    let is_asked = fit.noise == Noise::Declared
+        && fit.noise_factor >= MIN_NOISE_FACTOR
+        && fit.has_further_fits
+        && fit.fitting.loss == Loss::Squares
+        && fit.fitting.earlier.is_none();
+    if !(positions || images) || !is_asked {
+        return None;
     }
+    changed(fit, images)
 }
 
 impl Place {
@@ -223,13 +220,10 @@ fn mixed_targets(fit: &CheckedFit, linear: &Linear, places: &Places) -> Option<F
         }
         let identification = &fit.fitting.split.identification;
         let location = |&row: &usize| fit.fitting.measurements.location(identification[row]);
-        let shown: Vec<String> =
-            rows.iter().take(MAX_LISTED).map(|row| location(row).to_string()).collect();
-        let more = rows.len().saturating_sub(MAX_LISTED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let shown: Vec<String> = rows.iter().map(|row| location(row).to_string()).collect();
         let place = format!(
-            "in {}{more} ({} of {} rows)",
-            shown.join(", "),
+            "in {} ({} of {} rows)",
+            listed(&shown, MAX_LISTED),
             rows.len(),
             identification.len()
         );

@@ -22,17 +22,12 @@ use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 use crate::fit::uncertainty::second_solution::SecondSolution;
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::least_squares::{LinearisationCache, Loss};
+use crate::measurement::{Measurements, Split};
 use crate::model::Model;
-use crate::problem::{Observation, Problem};
+use crate::problem::{JointKind, Observation, Problem};
 
 /// Maximum number of solver steps of a further fit with another problem.
 const MAX_FURTHER_STEPS: u64 = 60;
-
-/// Check of a fit that may report findings.
-pub(in crate::fit) trait Check: Sync {
-    /// Returns the findings about `fit`; empty if nothing is wrong.
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding>;
-}
 
 /// Fit to which the checks are applied, with the data that they need.
 pub(in crate::fit) struct CheckedFit<'a> {
@@ -105,6 +100,11 @@ impl CheckedFit<'_> {
     pub fn kinds(&self) -> Vec<RowKind> {
         let kinds = self.fitting.measurements.kinds().into_iter().filter(|kind| kind.is_of_arm());
         kinds.map(|kind| self.kind(kind)).filter(|kind| !kind.rows.is_empty()).collect()
+    }
+
+    /// Returns the identification rows of the leading kind (positions, if there are any).
+    pub fn leading(&self) -> RowKind {
+        self.kind(self.fitting.measurements.leading())
     }
 
     /// Collects the identification rows of the same kind as `observation`, with their spread and σ.
@@ -192,6 +192,47 @@ impl CheckedFit<'_> {
         }))
     }
 
+    /// Returns true if the joint at index `joint` takes an angle as its command.
+    pub fn turns(&self, joint: usize) -> bool {
+        self.problem.joints[joint].command_kind() == JointKind::Revolute
+    }
+
+    /// Calls `evaluate` with the fit of the identification rows `rows` of `table` alone, which has the
+    /// rows of the table of this fit, to their positions.
+    pub fn with_rows<R>(
+        &self,
+        table: &Measurements,
+        rows: &[usize],
+        evaluate: impl FnOnce(&Fitting) -> R,
+    ) -> R {
+        let Fitting { placement, model, .. } = *self.fitting;
+        let split = &Split { identification: rows.to_vec(), held_out: Vec::new() };
+        let held_out_only = placement.held_out_only(model, table, split);
+        let declared = self.fitting.with_declared_noise();
+        evaluate(&Fitting {
+            split,
+            measurements: table,
+            turn_sigma: None,
+            held_out_only,
+            ..declared
+        })
+    }
+
+    /// Returns the rms error of the nominal arm after its registration to the `rows` of `table`
+    /// alone \[m\].
+    pub fn registration_error(&self, table: &Measurements, rows: &[usize]) -> Option<f64> {
+        self.with_rows(table, rows, |fitting| {
+            let x = fitting.registered().ok()?;
+            Some(self.rms(rows, &fitting.position_errors(rows, &x)))
+        })
+    }
+
+    /// Returns the root mean squared error of some identification rows with the full parameter vector
+    /// `x`, in their unit ([`rms`](Self::rms)).
+    pub fn rms_at(&self, rows: &[usize], x: &DVector<f64>) -> f64 {
+        self.rms(rows, &self.fitting.position_errors(rows, x))
+    }
+
     /// Returns the root mean squared length of the `errors` of some identification rows, in their
     /// unit. Rows that a robust loss treats as outliers are left out.
     pub fn rms(&self, rows: &[usize], errors: &[Vector3<f64>]) -> f64 {
@@ -205,33 +246,5 @@ impl CheckedFit<'_> {
             .map(|(_, error)| error.norm_squared())
             .collect();
         (kept.iter().sum::<f64>() / kept.len().max(1) as f64).sqrt()
-    }
-}
-
-/// Checks that the rows measure at least as many coordinates as there are unknowns without a prior,
-/// and that they determine every base.
-pub(super) struct EnoughEquations;
-
-impl Check for EnoughEquations {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        fit.poses.finding.clone().into_iter().collect()
-    }
-}
-
-/// Checks that held-out rows determine the bases and tools that only they use.
-pub(super) struct HeldOutPlaced;
-
-impl Check for HeldOutPlaced {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        fit.poses.held_out.clone().into_iter().collect()
-    }
-}
-
-/// Checks that the fit converged.
-pub(super) struct Convergence;
-
-impl Check for Convergence {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        fit.not_converged.cloned().into_iter().collect()
     }
 }

@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
-use super::misfit::Misfit;
+use super::misfit::misfit;
 use super::parameter_limits::MAX_PRIOR_SIGMAS;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{KnownDistance, Observation};
@@ -32,30 +32,24 @@ const MAX_UNEXPLAINED: f64 = 0.1;
 
 /// Checks that the lengths of the arm do not deviate from nominal by one common factor, as they do
 /// if the lengths that scale the measurements are wrong.
-pub(super) struct ScaleHolds;
-
-impl Check for ScaleHolds {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let Some(found) = CommonFactor::of(fit).filter(CommonFactor::is_clear) else {
-            return Vec::new();
-        };
-        // A fit that is far off says nothing about a scale.
-        if !Misfit.check(fit).is_empty() {
-            return Vec::new();
-        }
-        let CommonFactor { error, score, lengths, .. } = found;
-        let side = if error > 0.0 { "longer" } else { "shorter" };
-        let sigmas = score.abs();
-        let text = format!(
-            "a common factor of {:.4} explains the {lengths} fitted lengths of the arm: they are \
-             {:.2} % {side} than declared, {sigmas:.1} σ beyond what their priors allow",
-            1.0 + error,
-            100.0 * error.abs()
-        );
-        let numbers = [error.into(), sigmas.into(), json!(lengths)];
-        let finding = Finding::new(FindingCode::ScaleContradicted, numbers, text);
-        vec![finding.with_remedy(remedy(fit, 1.0 + error))]
+pub(super) fn scale_holds(fit: &CheckedFit) -> Option<Finding> {
+    let found = CommonFactor::of(fit).filter(CommonFactor::is_clear)?;
+    // A fit that is far off says nothing about a scale.
+    if !misfit(fit).is_empty() {
+        return None;
     }
+    let CommonFactor { error, score, lengths, .. } = found;
+    let side = if error > 0.0 { "longer" } else { "shorter" };
+    let sigmas = score.abs();
+    let text = format!(
+        "a common factor of {:.4} explains the {lengths} fitted lengths of the arm: they are \
+         {:.2} % {side} than declared, {sigmas:.1} σ beyond what their priors allow",
+        1.0 + error,
+        100.0 * error.abs()
+    );
+    let numbers = [error.into(), sigmas.into(), json!(lengths)];
+    let finding = Finding::new(FindingCode::ScaleContradicted, numbers, text);
+    Some(finding.with_remedy(remedy(fit, 1.0 + error)))
 }
 
 /// Smallest common relative deviation of the lengths at which the arm may be one of another size of

@@ -4,8 +4,7 @@
 use nalgebra::Vector3;
 
 use super::checked_fit::CheckedFit;
-use super::row_kind::format_error;
-use crate::error::Location;
+use super::row_kind::{AXES, format_error};
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Joint, JointKind, Problem, Target};
 use crate::quantity::Unit;
@@ -106,9 +105,8 @@ fn single_entry(
     (parameter, x): (&Parameter, f64),
     is_far: impl Fn(&Parameter, f64) -> bool,
 ) -> Option<ContradictedEntry> {
-    let kind = fit.kind(fit.fitting.measurements.leading());
-    let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
-    let rms = fit.rms(&kind.rows, &errors);
+    let kind = fit.leading();
+    let rms = fit.rms_at(&kind.rows, &fit.end.x);
     let displacement = match parameter.unit() {
         Unit::Length => x.abs(),
         Unit::Angle => x.abs() * fit.fitting.model.reach(),
@@ -161,7 +159,7 @@ fn joint_entry(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> Cont
     let (declared, fitted) = (shown(parameter.nominal), shown(parameter.value(x)));
     let symbol = &display.symbol;
     let gap = if symbol == "°" { "" } else { " " };
-    let place = Location { key: None, ..joint.location.clone() };
+    let place = joint.location.of_line();
     let words = format!(
         "{}{gap}{symbol} is declared ({place}), the measurements say {fitted:.2}{gap}{symbol}, with \
          which the error is {left}",
@@ -234,7 +232,7 @@ pub(super) fn mistaken_target(declared: Vector3<f64>, fitted: Vector3<f64>) -> O
         (meant - fitted).norm() < limit
     });
     if let Some((first, second)) = exchanged {
-        let name = |axis: usize| ['x', 'y', 'z'][axis];
+        let name = |axis: usize| AXES[axis];
         return Some(format!("{} and {} seem to be exchanged", name(first), name(second)));
     }
     let units = [(1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches")];

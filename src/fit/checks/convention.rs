@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{DVector, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
 use super::checked_fit::CheckedFit;
+use super::row_kind::AXES;
 use crate::fit::stages::fitting::Fitting;
 use crate::problem::RotationKind;
 
@@ -102,10 +103,8 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
     for axes in 1..7_usize {
         let is_turned = |axis: &usize| axes >> axis & 1 == 1;
         let turned: Vec<usize> = (0..3).filter(is_turned).collect();
-        let names: Vec<String> = turned
-            .iter()
-            .map(|&axis| format!("{0} (r{0} or q{0})", ["x", "y", "z"][axis]))
-            .collect();
+        let names: Vec<String> =
+            turned.iter().map(|&axis| format!("{0} (r{0} or q{0})", AXES[axis])).collect();
         let of_signs: Reading = Box::new(move |q| {
             let numbers = table_numbers(kind, q).map(|mut angles| {
                 for &axis in &turned {
@@ -152,7 +151,7 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
     });
     readings.push((IN_RADIANS.to_owned(), in_radians));
     for order in ROTATION_AXES {
-        let letters: Vec<char> = order.iter().map(|&axis| ['x', 'y', 'z'][axis]).collect();
+        let letters: Vec<&str> = order.iter().map(|&axis| AXES[axis]).collect();
         let [a, b, c] = [letters[0], letters[1], letters[2]];
         let of_order: Reading =
             Box::new(move |q| table_numbers(kind, q).map(|angles| euler(order, &angles)).to_vec());
@@ -168,7 +167,7 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
         };
         let of_order: Reading =
             Box::new(move |q| table_numbers(kind, q).map(|of| moved(&of)).to_vec());
-        let letters = |axes: [usize; 3]| axes.map(|axis| ['x', 'y', 'z'][axis]);
+        let letters = |axes: [usize; 3]| axes.map(|axis| AXES[axis]);
         let ([a, b, c], [x, y, z]) = (letters(order), letters(columns));
         let name = format!("Euler angles with R = R{a} R{b} R{c} whose columns hold {x}, {y}, {z}");
         if columns != [0, 1, 2] {
@@ -304,7 +303,7 @@ mod tests {
                 .collect();
             for (name, reading) in readings(RotationKind::Vector) {
                 let error = misfit(&pairs, &reading);
-                let letters = meant.map(|axis| ['x', 'y', 'z'][axis]);
+                let letters = meant.map(|axis| AXES[axis]);
                 let is_meant = name
                     == format!(
                         "Euler angles with R = R{} R{} R{}",

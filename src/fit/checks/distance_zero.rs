@@ -76,7 +76,7 @@ pub(in crate::fit) fn distance_zero(
     );
     let remedy = "correct the zero of this wire or bar, by which all its distances are wrong";
     let numbers = [json!([words]), declared.into(), left.into()];
-    Some(Finding::new(FindingCode::Misread, numbers, text).with_remedy(remedy.to_owned()))
+    Some(Finding::new(FindingCode::Misread, numbers, text).with_remedy(remedy))
 }
 
 /// Returns true for a distance to the fixture with the index `anchor`.

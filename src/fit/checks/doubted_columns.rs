@@ -4,15 +4,14 @@
 use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::contradicted_entry::rounded;
 use super::finding::{Finding, FindingCode};
 use super::followed_commands::{Neighbour, Relation, Unrelated, unrelated};
-use super::misfit::Misfit;
-use super::row_kind::format_error;
+use super::misfit::misfit;
+use super::row_kind::{AXES, format_error};
 use super::row_relation::{OtherRows, other_rows};
-use crate::fit::stages::fitting::Fitting;
-use crate::measurement::{Measurements, Split};
+use crate::measurement::Measurements;
 use crate::problem::JointKind;
 
 /// Largest range of the commands of a joint that stands still: 0.1° \[rad\], or 0.1 mm \[m\].
@@ -33,24 +32,17 @@ const MAX_RATIO: f64 = 0.2;
 /// Checks, if the fit is far off, that no joint stands still in all rows or from a row on while the
 /// rows before fit, that no column rises by the same step from a row on, that the positions follow
 /// each joint column, and that no coordinate is sorted by itself.
-pub(super) struct ColumnsHoldMeasurements;
-
-impl Check for ColumnsHoldMeasurements {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let positions = fit.fitting.measurements.leading().is_position();
-        let missed = Misfit.check(fit).into_iter().next();
-        let Some(before) = missed.filter(|_| positions).and_then(|found| found.number("rms"))
-        else {
-            return Vec::new();
-        };
-        let found = repeated_coordinate(fit, before)
-            .or_else(|| filled_or_frozen(fit, before))
-            .or_else(|| unrelated_to_positions(fit, before))
-            .or_else(|| standing_still(fit, before))
-            .or_else(|| sorted_by_itself(fit, before))
-            .or_else(|| of_other_rows(fit, before));
-        found.into_iter().collect()
-    }
+pub(super) fn columns_hold_measurements(fit: &CheckedFit) -> Option<Finding> {
+    let positions = fit.fitting.measurements.leading().is_position();
+    let missed = misfit(fit).into_iter().next();
+    let before = missed.filter(|_| positions).and_then(|found| found.number("rms"))?;
+    let found = repeated_coordinate(fit, before)
+        .or_else(|| filled_or_frozen(fit, before))
+        .or_else(|| unrelated_to_positions(fit, before))
+        .or_else(|| standing_still(fit, before))
+        .or_else(|| sorted_by_itself(fit, before))
+        .or_else(|| of_other_rows(fit, before));
+    found
 }
 
 /// Returns the name of the column of a joint.
@@ -77,7 +69,7 @@ pub(super) fn still_joints(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -
     let is_still = |joint: &usize| {
         let (least, most) =
             crate::numeric::range(rows.iter().map(|&row| table.configuration(row)[*joint]));
-        let is_turning = fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
+        let is_turning = fit.turns(*joint);
         most - least < if is_turning { MAX_STILL_TURN } else { MAX_STILL_TRAVEL }
     };
     joints.iter().copied().filter(is_still).collect()
@@ -122,7 +114,7 @@ fn filled_or_frozen(fit: &CheckedFit, before: f64) -> Option<Finding> {
             return None;
         }
         let (name, place) = (column_name(rows, joint), rows.location(from + 1));
-        let is_turning = fit.problem.joints[joint].command_kind() == JointKind::Revolute;
+        let is_turning = fit.turns(joint);
         let shown = |value: f64| {
             let (size, unit) =
                 if is_turning { (value.to_degrees(), "°") } else { (value * 1e3, " mm") };
@@ -209,7 +201,7 @@ fn is_sorted(values: &[f64]) -> bool {
 /// Reports a coordinate that is the same in all rows although the nominal arm does not move in a
 /// plane, or two coordinates that are equal in all rows.
 fn repeated_coordinate(fit: &CheckedFit, before: f64) -> Option<Finding> {
-    let kind = fit.kind(fit.fitting.measurements.leading());
+    let kind = fit.leading();
     let points = &fit.fitting.measurements.positions;
     let (first, n) = (points[*kind.rows.first()?], kind.rows.len());
     let is_in_all =
@@ -217,7 +209,7 @@ fn repeated_coordinate(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let is_same = |axis: &usize| is_in_all(&|point| point[*axis].total_cmp(&first[*axis]).is_eq());
     let is_copied =
         |(a, b): &(usize, usize)| is_in_all(&|point| point[*a].total_cmp(&point[*b]).is_eq());
-    let name = |axis: usize| ["x", "y", "z"][axis].to_owned();
+    let name = |axis: usize| AXES[axis].to_owned();
     let (names, what) = if let Some(axis) = (0..3).find(is_same) {
         let poses = fit.fitting.poses(&kind.rows);
         let nominal = fit.fitting.located();
@@ -255,7 +247,7 @@ fn sorted_by_itself(fit: &CheckedFit, before: f64) -> Option<Finding> {
     if rows.len() < 2 * MIN_ROWS || moving(fit).any(|joint| is_sorted(&commands(rows, joint))) {
         return None;
     }
-    let name = ["x", "y", "z"][only].to_owned();
+    let name = AXES[only].to_owned();
     let text = format!(
         "the coordinate {name} is sorted from the first row to the last, no other column of positions \
          and joints is, and the fitted arm misses the measurements by {}: this column was probably \
@@ -295,7 +287,7 @@ fn of_other_rows(fit: &CheckedFit, before: f64) -> Option<Finding> {
         );
         (text, "copy the column again, with all columns of a row together")
     };
-    Some(finding(&names, before, None, text).with_remedy(remedy.to_owned()))
+    Some(finding(&names, before, None, text).with_remedy(remedy))
 }
 
 /// Creates the finding about doubted columns.
@@ -309,12 +301,9 @@ fn finding(columns: &[String], before: f64, after: Option<f64>, text: String) ->
 fn error_before(fit: &CheckedFit, row: usize) -> Option<f64> {
     let chosen: Vec<usize> =
         fit.fitting.split.identification.iter().copied().filter(|&k| k < row).collect();
-    let split = Split { identification: chosen.clone(), held_out: Vec::new() };
-    let fitting = Fitting { split: &split, turn_sigma: None, ..fit.fitting.with_declared_noise() };
     if chosen.len() < MIN_ROWS {
-        return None;
+        None
+    } else {
+        fit.registration_error(fit.fitting.measurements, &chosen)
     }
-    let x = fitting.registered().ok()?;
-    let errors = fitting.position_errors(&chosen, &x);
-    Some(fit.rms(&chosen, &errors))
 }

@@ -5,13 +5,11 @@ use std::collections::BTreeSet;
 use nalgebra::{DVector, Vector3};
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
-use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, Misfit};
+use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, misfit};
 use super::mistaken_rows::MistakenRows;
-use super::registered_rows::of_rows;
-use super::row_kind::format_error;
-use crate::measurement::Split;
+use super::row_kind::{format_error, listed};
 use crate::numeric::median;
 
 /// Number of successive rows of each base to which the nominal arm is registered in a trial. They
@@ -23,7 +21,8 @@ const MAX_TRIALS: usize = 12;
 const MAX_RATIO: f64 = 0.2;
 /// Largest error of a row that fits, as a multiple of the rms error that is not reported as a misfit.
 const MAX_OF_RMS: f64 = 2.5;
-/// Maximum number of held-out rows that the text names.
+/// Maximum number of rows that the text lists, and of held-out ones.
+const MAX_LISTED: usize = 4;
 const MAX_HELD_OUT: usize = 3;
 /// Largest ratio of the error of a row that fits to the median error of all rows.
 const MAX_RATIO_TO_MEDIAN: f64 = 4.0;
@@ -42,15 +41,11 @@ pub(super) fn is_open(found: &Finding) -> bool {
 }
 
 /// Checks, if the fit is far off, that most rows do not fit the nominal arm without the others.
-pub(super) struct RowsBelongTogether;
-
-impl Check for RowsBelongTogether {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let positions = fit.fitting.measurements.leading().is_position();
-        let missed = Misfit.check(fit).into_iter().next().filter(|_| positions);
-        let before = missed.and_then(|found| found.number("rms"));
-        before.and_then(|before| doubted(fit, before)).into_iter().collect()
-    }
+pub(super) fn rows_belong_together(fit: &CheckedFit) -> Option<Finding> {
+    let positions = fit.fitting.measurements.leading().is_position();
+    let missed = misfit(fit).into_iter().next().filter(|_| positions);
+    let before = missed.and_then(|found| found.number("rms"));
+    before.and_then(|before| doubted(fit, before))
 }
 
 /// Errors of the nominal arm after its registration to some rows.
@@ -68,14 +63,15 @@ struct Trial {
 /// Returns the finding on rows without which the nominal arm fits; `before` is the rms error of the
 /// fit \[m\].
 fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
-    let kind = fit.kind(fit.fitting.measurements.leading());
+    let kind = fit.leading();
     let rows = &kind.rows;
     let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
     let unreported = (MAX_MISS * kind.spread).max(noise);
     let limit = (MAX_RATIO * before).min(MAX_OF_RMS * unreported);
     let registered = |chosen: &[usize], is_first: bool| -> Option<Trial> {
         let chosen: Vec<usize> = chosen.iter().map(|&place| rows[place]).collect();
-        let x = registration(fit, chosen)?;
+        let table = fit.fitting.measurements;
+        let x = fit.with_rows(table, &chosen, |fitting| fitting.registered().ok())?;
         let errors = fit.fitting.position_errors(rows, &x);
         // Few wrong rows leave a small rms error, which the nominal arm may exceed in many rows.
         let usual = MAX_RATIO_TO_MEDIAN * median(errors.iter().map(nalgebra::Matrix::norm))?;
@@ -114,13 +110,11 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         return None;
     }
     let cause = cause.unwrap_or_else(|| OPEN_CAUSE.to_owned());
-    let listed = if last + 1 - first == apart.len() && apart.len() > 2 {
+    let named = if last + 1 - first == apart.len() && apart.len() > 2 {
         format!("the rows from {} to {}", place(first), place(last))
     } else {
-        let shown: Vec<String> = apart.iter().take(4).map(|&row| place(row)).collect();
-        let more = apart.len() - shown.len();
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        format!("the rows {}{more}", shown.join(", "))
+        let places: Vec<String> = apart.iter().map(|&row| place(row)).collect();
+        format!("the rows {}", listed(&places, MAX_LISTED))
     };
     let is_position = |row: &usize| measurements.observation(*row).is_position();
     let held_out: Vec<usize> =
@@ -128,15 +122,13 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let errors = fit.fitting.position_errors(&held_out, &trial.x);
     let far = held_out.iter().zip(&errors).filter(|(_, of)| of.norm() > before.max(trial.limit));
     let far: Vec<String> = far.map(|(&row, _)| measurements.location(row).to_string()).collect();
-    let far = match far.len().saturating_sub(MAX_HELD_OUT) {
-        _ if far.is_empty() => String::new(),
-        0 => format!(", and {} of the held-out rows", far.join(", ")),
-        more => {
-            format!(", and {} and {more} more of the held-out rows", far[..MAX_HELD_OUT].join(", "))
-        }
+    let far = if far.is_empty() {
+        String::new()
+    } else {
+        format!(", and {} of the held-out rows", listed(&far, MAX_HELD_OUT))
     };
     let text = format!(
-        "{listed} ({} of {}{far}) contradict the others: without them the nominal arm misses by {} instead of \
+        "{named} ({} of {}{far}) contradict the others: without them the nominal arm misses by {} instead of \
          {}; {cause}",
         apart.len(),
         rows.len(),
@@ -146,12 +138,6 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let lines: Vec<_> = apart.iter().map(|&row| json!(place(row))).collect();
     let numbers = [json!(lines), rows.len().into(), before.into(), after.into()];
     Some(Finding::new(FindingCode::RowsDoubted, numbers, text))
-}
-
-/// Registers the nominal arm to the `chosen` identification rows alone.
-fn registration(fit: &CheckedFit, chosen: Vec<usize>) -> Option<DVector<f64>> {
-    let split = Split { identification: chosen, held_out: Vec::new() };
-    of_rows(fit, fit.fitting.measurements, &split, |fitting| fitting.registered().ok())
 }
 
 /// Returns the words for `chosen` rows that are those of other targets than all rows that are

@@ -354,8 +354,17 @@ impl Finding {
 
     /// Returns the finding with its remedy replaced by one specific to this case.
     #[must_use]
-    pub(crate) fn with_remedy(self, remedy: String) -> Self {
-        Self { remedy, ..self }
+    pub(crate) fn with_remedy(self, remedy: impl Into<String>) -> Self {
+        Self { remedy: remedy.into(), ..self }
+    }
+
+    /// Returns the finding with its remedy replaced if there is one specific to this case.
+    #[must_use]
+    pub(crate) fn with_remedy_of(self, remedy: Option<String>) -> Self {
+        match remedy {
+            Some(remedy) => self.with_remedy(remedy),
+            None => self,
+        }
     }
 
     /// Replaces a remedy that suggests `flexcal loop` by one that applies after a loop; other

@@ -3,27 +3,24 @@
 
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode, OF_MISFIT};
 use super::outliers::{InfluentialRows, outliers_as_json};
 use super::point_spread::PointSpread;
+use super::row_kind::listed;
 use crate::fit::Identification;
 use crate::problem::Observation;
 
 /// Checks that no identification row has a residual too large to be noise.
-pub(super) struct NoOutliers;
-
-impl Check for NoOutliers {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let (count, of) = (fit.outliers.len(), fit.fitting.split.identification.len());
-        if count == 0 {
-            return Vec::new();
-        }
-        let verb = if count == 1 { "stands" } else { "stand" };
-        let text = format!("{count} of {of} identification rows {verb} out from the others");
-        let numbers = [outliers_as_json(fit.outliers), of.into()];
-        vec![Finding::new(FindingCode::Outliers, numbers, text)]
+pub(super) fn no_outliers(fit: &CheckedFit) -> Option<Finding> {
+    let (count, of) = (fit.outliers.len(), fit.fitting.split.identification.len());
+    if count == 0 {
+        return None;
     }
+    let verb = if count == 1 { "stands" } else { "stand" };
+    let text = format!("{count} of {of} identification rows {verb} out from the others");
+    let numbers = [outliers_as_json(fit.outliers), of.into()];
+    Some(Finding::new(FindingCode::Outliers, numbers, text))
 }
 
 /// Codes of findings that explain a misfit by another reading of the whole table.
@@ -55,14 +52,11 @@ impl Identification {
         // Without another error, the fit would be trusted although the rows count in full.
         if others.clone().any(|finding| OF_MISFIT.contains(&finding.code)) {
             let mut findings: Vec<Finding> = others.cloned().collect();
-            let places: Vec<String> =
-                rows.iter().take(MAX_NAMED).map(|row| row.location.to_string()).collect();
-            let more = rows.len().saturating_sub(MAX_NAMED);
-            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let places: Vec<String> = rows.iter().map(|row| row.location.to_string()).collect();
             let (cause, them) = if rows.len() == 1 { ("causes", "it") } else { ("cause", "them") };
             let remedy = format!(
-                "{}{more} {cause} most of it: correct {them}, or leave {them} out",
-                places.join(", ")
+                "{} {cause} most of it: correct {them}, or leave {them} out",
+                listed(&places, MAX_NAMED)
             );
             // That finding says also what is wrong in the rows.
             let has_doubted_rows =
@@ -75,7 +69,7 @@ impl Identification {
             let is_read_otherwise = findings.iter().any(has_readings);
             for finding in &mut findings {
                 if OF_MISFIT.contains(&finding.code) && !has_doubted_rows && !is_read_otherwise {
-                    *finding = finding.clone().with_remedy(remedy.clone());
+                    finding.remedy = remedy.clone();
                 }
             }
             if !findings.iter().any(|finding| finding.code == FindingCode::Misread) {
@@ -90,21 +84,17 @@ impl Identification {
 
 /// Checks that at no touched point the predicted target scatters far more than at the others and
 /// along one direction, as it does if the point moved.
-pub(super) struct SteadyPoints;
-
-impl Check for SteadyPoints {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let finding = |(spread, times): (&PointSpread, f64)| {
-            let point = &spread.point;
-            let text = format!(
-                "the predictions at point {point} scatter {times:.1} times as far as at the median point, {:.0} % of it along one \
-                 direction",
-                100.0 * spread.share
-            );
-            let numbers = [json!(point), times.into(), spread.share.into()];
-            Finding::new(FindingCode::UnsteadyPoint, numbers, text)
-        };
-        let fitted = fit.spreads.iter().map(|(_, fitted, _)| fitted);
-        PointSpread::unsteady(fitted).into_iter().map(finding).collect()
-    }
+pub(super) fn steady_points(fit: &CheckedFit) -> Vec<Finding> {
+    let finding = |(spread, times): (&PointSpread, f64)| {
+        let point = &spread.point;
+        let text = format!(
+            "the predictions at point {point} scatter {times:.1} times as far as at the median point, {:.0} % of it along one \
+             direction",
+            100.0 * spread.share
+        );
+        let numbers = [json!(point), times.into(), spread.share.into()];
+        Finding::new(FindingCode::UnsteadyPoint, numbers, text)
+    };
+    let fitted = fit.spreads.iter().map(|(_, fitted, _)| fitted);
+    PointSpread::unsteady(fitted).into_iter().map(finding).collect()
 }

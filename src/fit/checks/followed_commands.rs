@@ -7,10 +7,8 @@ use nalgebra::Vector3;
 
 use super::checked_fit::CheckedFit;
 use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL};
-use super::registered_rows::registration_error;
 use crate::fit::stages::fitting::Fitting;
-use crate::measurement::{Measurements, Split};
-use crate::problem::JointKind;
+use crate::measurement::Measurements;
 
 /// Maximum number of rows, evenly spaced, with which the search is made.
 const MAX_ROWS: usize = 60;
@@ -160,7 +158,7 @@ fn related(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
 /// coordinate found from each of them; `before` is the rms error of the fit \[m\] and `joints` are
 /// the indices of the joints with commands. The search is local, so it can miss such a column.
 pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Option<Unrelated> {
-    let kind = fit.kind(fit.fitting.measurements.leading());
+    let kind = fit.leading();
     let step = kind.rows.len().div_ceil(MAX_ROWS).max(1);
     let rows: Vec<usize> = kind.rows.iter().copied().step_by(step).collect();
     if rows.len() < MIN_ROWS {
@@ -182,7 +180,7 @@ pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Opti
     let command = |row: usize| fit.fitting.measurements.configuration(row)[joint];
     let pairs = rows.iter().zip(found).map(|(&row, &coordinate)| (row, command(row), coordinate));
     let column: Vec<f64> = (0..fit.fitting.measurements.len()).map(command).collect();
-    let is_turning = fit.problem.joints[joint].command_kind() == JointKind::Revolute;
+    let is_turning = fit.turns(joint);
     (after < limit && is_alone).then(|| Unrelated {
         joint,
         after,
@@ -204,7 +202,7 @@ fn of_neighbour(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -> Option<Un
         let (rows, coordinates): (Vec<usize>, Vec<f64>) = pairs.unzip();
         let mut corrected = table.clone();
         set(&mut corrected, &rows, (joint, &coordinates));
-        let after = registration_error(fit, &corrected, &rows)?;
+        let after = fit.registration_error(&corrected, &rows)?;
         Some(Unrelated { joint, after, relation: Some(Relation::OfNeighbour(neighbour)) })
     };
     let columns: Vec<(usize, Neighbour)> = joints
@@ -219,9 +217,8 @@ fn of_neighbour(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -> Option<Un
 /// found from the positions \[m\], and these coordinates.
 fn error_without(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<(f64, Vec<f64>)> {
     let Fitting { placement, model, measurements, .. } = *fit.fitting;
-    let split = Split { identification: rows.to_vec(), held_out: Vec::new() };
     let mut table = measurements.clone();
-    let is_turning = fit.problem.joints[joint].command_kind() == JointKind::Revolute;
+    let is_turning = fit.turns(joint);
     let commands = || rows.iter().map(|&row| measurements.configuration(row)[joint]);
     let least = commands().fold(f64::INFINITY, f64::min);
     let most = commands().fold(f64::NEG_INFINITY, f64::max);
@@ -232,18 +229,11 @@ fn error_without(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<(f64,
     let mut last = f64::INFINITY;
     for pass in 0..PASSES {
         set(&mut table, rows, (joint, &found));
-        let held_out_only = placement.held_out_only(model, &table, &split);
-        let declared = fit.fitting.with_declared_noise();
-        let fitting = Fitting {
-            split: &split,
-            measurements: &table,
-            turn_sigma: None,
-            held_out_only,
-            ..declared
-        };
         // A target that is free moves to the axis of a joint whose column says nothing, so that the
         // joint has no effect: it keeps its declared place at first.
-        let x = if pass < PASSES / 2 { fitting.located() } else { fitting.registered().ok()? };
+        let x = fit.with_rows(&table, rows, |fitting| {
+            if pass < PASSES / 2 { Some(fitting.located()) } else { fitting.registered().ok() }
+        })?;
         let errors_at = |coordinates: &[f64]| {
             let mut table = measurements.clone();
             set(&mut table, rows, (joint, coordinates));

@@ -5,9 +5,9 @@ use std::collections::HashSet;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
-use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD, Misfit};
+use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD, misfit};
 use super::mistaken_rows::MistakenRows;
 use super::outliers::{Outlier, outliers_as_json};
 use super::row_kind::{RowKind, format_error, row_noun};
@@ -119,119 +119,98 @@ fn copies(fit: &CheckedFit) -> usize {
 const MAX_NAMED_ROWS: usize = 3;
 
 /// Checks that at least one held-out row is no copy of an identification row.
-pub(super) struct NotAllCopied;
-
-impl Check for NotAllCopied {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let rows = fit.fitting.split.held_out.len();
-        if rows == 0 || copies(fit) < rows {
-            return Vec::new();
-        }
-        let text = "all held-out rows are identification rows again: their errors judge nothing"
-            .to_owned();
-        vec![Finding::new(FindingCode::HeldOutCopied, [rows.into()], text)]
+pub(super) fn not_all_copied(fit: &CheckedFit) -> Option<Finding> {
+    let rows = fit.fitting.split.held_out.len();
+    if rows == 0 || copies(fit) < rows {
+        return None;
     }
+    let text =
+        "all held-out rows are identification rows again: their errors judge nothing".to_owned();
+    Some(Finding::new(FindingCode::HeldOutCopied, [rows.into()], text))
 }
 
 /// Checks that no held-out row copies an identification row, unless all do.
-pub(super) struct NotRepeated;
-
-impl Check for NotRepeated {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let (rows, of) = (copies(fit), fit.fitting.split.held_out.len());
-        if rows == 0 || rows == of {
-            return Vec::new();
-        }
-        let text = format!(
-            "{rows} of {of} held-out rows are identification rows again: they judge nothing"
-        );
-        let numbers = [rows.into(), of.into()];
-        vec![Finding::new(FindingCode::HeldOutRepeated, numbers, text)]
+pub(super) fn not_repeated(fit: &CheckedFit) -> Option<Finding> {
+    let (rows, of) = (copies(fit), fit.fitting.split.held_out.len());
+    if rows == 0 || rows == of {
+        return None;
     }
+    let text =
+        format!("{rows} of {of} held-out rows are identification rows again: they judge nothing");
+    let numbers = [rows.into(), of.into()];
+    Some(Finding::new(FindingCode::HeldOutRepeated, numbers, text))
 }
 
 /// Smallest share of held-out rows of fitted poses that is reported.
 const MIN_FITTED_SHARE: f64 = 0.5;
 
 /// Checks that at most half of the held-out rows are of poses that were fitted too.
-pub(super) struct OtherPosesHeldOut;
-
-impl Check for OtherPosesHeldOut {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let Fitting { measurements, split, .. } = fit.fitting;
-        let poses = measurements.pose_numbers(fit.problem);
-        // Other loads and temperatures judge the model, also at the same joint angles.
-        let bits = |column: &Option<Vec<f64>>, row: usize| {
-            column.as_ref().map(|values| values[row].to_bits())
-        };
-        let temperature = |row: usize| {
-            measurements.temperature.as_ref().map(|values| values[row].round().to_bits())
-        };
-        let state = |&row: &usize| {
-            let loads =
-                [&measurements.payload, &measurements.hoist].map(|column| bits(column, row));
-            (poses[row], loads, temperature(row))
-        };
-        let fitted: HashSet<_> = split.identification.iter().map(state).collect();
-        let rows = split.held_out.iter().filter(|row| fitted.contains(&state(row))).count();
-        let of = split.held_out.len();
-        if rows as f64 <= MIN_FITTED_SHARE * of as f64 || copies(fit) > 0 {
-            return Vec::new();
-        }
-        let text = format!(
-            "{rows} of {of} held-out rows are of poses that are fitted too: their errors show how well \
-             poses repeat, not how well other poses are predicted"
-        );
-        let numbers = [rows.into(), of.into()];
-        vec![Finding::new(FindingCode::HeldOutPosesFitted, numbers, text)]
+pub(super) fn other_poses_held_out(fit: &CheckedFit) -> Option<Finding> {
+    let Fitting { measurements, split, .. } = fit.fitting;
+    let poses = measurements.pose_numbers(fit.problem);
+    // Other loads and temperatures judge the model, also at the same joint angles.
+    let bits =
+        |column: &Option<Vec<f64>>, row: usize| column.as_ref().map(|values| values[row].to_bits());
+    let temperature =
+        |row: usize| measurements.temperature.as_ref().map(|values| values[row].round().to_bits());
+    let state = |&row: &usize| {
+        let loads = [&measurements.payload, &measurements.hoist].map(|column| bits(column, row));
+        (poses[row], loads, temperature(row))
+    };
+    let fitted: HashSet<_> = split.identification.iter().map(state).collect();
+    let rows = split.held_out.iter().filter(|row| fitted.contains(&state(row))).count();
+    let of = split.held_out.len();
+    if rows as f64 <= MIN_FITTED_SHARE * of as f64 || copies(fit) > 0 {
+        return None;
     }
+    let text = format!(
+        "{rows} of {of} held-out rows are of poses that are fitted too: their errors show how well \
+         poses repeat, not how well other poses are predicted"
+    );
+    let numbers = [rows.into(), of.into()];
+    Some(Finding::new(FindingCode::HeldOutPosesFitted, numbers, text))
 }
 
 /// Checks that the median prediction error of the held-out rows of each kind is small relative to
 /// the spread of the fitted rows, or to σ.
-pub(super) struct HeldOutReached;
-
-impl Check for HeldOutReached {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let fitting = fit.fitting;
-        let errors = fitting.position_errors(&fitting.split.held_out, &fit.end.x);
-        let of_kind = |row_kind: RowKind| {
-            let RowKind { observation, spread, declared_sigma, .. } = row_kind;
-            let kind = observation.kind();
-            let is_of_kind = |row: usize| fitting.measurements.observation(row).kind() == kind;
-            let held_out = fitting.split.held_out.iter().copied().zip(&errors);
-            let (rows, errors): (Vec<usize>, Vec<Vector3<f64>>) =
-                held_out.filter(|(row, _)| is_of_kind(*row)).unzip();
-            let lengths = errors.iter().map(nalgebra::Matrix::norm);
-            let median = median(lengths.filter(|length| length.is_finite())).unwrap_or(0.0);
-            let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
-            let text = format!(
-                "half of the held-out {} are missed by more than {}, {:.0} % of the spread of the \
-                 fitted ones",
-                row_noun(kind),
-                format_error(kind, median, 1),
-                100.0 * median / spread
-            );
-            let numbers = [kind.into(), median.into(), spread.into()];
-            let finding = || {
-                let finding = Finding::new(FindingCode::HeldOutMissed, numbers, text);
-                match held_base(fitting) {
-                    Some(base) => finding.with_remedy(format!(
-                        "base[{base}] is held where it is declared, while another base is free: \
-                         free it in [parameters], \"base[{base}].*\" = {{ free = true }}"
-                    )),
-                    None => match mistake(fit, &row_kind, (&rows, &errors)) {
-                        Some(words) => finding.with_remedy(format!(
-                            "{words}; correct these rows, or hold out others"
-                        )),
-                        None => finding,
-                    },
-                }
-            };
-            (spread > MIN_SPREAD && median > MAX_MISS * spread && median > noise).then(finding)
+pub(super) fn held_out_reached(fit: &CheckedFit) -> Vec<Finding> {
+    let fitting = fit.fitting;
+    let errors = fitting.position_errors(&fitting.split.held_out, &fit.end.x);
+    let of_kind = |row_kind: RowKind| {
+        let RowKind { observation, spread, declared_sigma, .. } = row_kind;
+        let kind = observation.kind();
+        let is_of_kind = |row: usize| fitting.measurements.observation(row).kind() == kind;
+        let held_out = fitting.split.held_out.iter().copied().zip(&errors);
+        let (rows, errors): (Vec<usize>, Vec<Vector3<f64>>) =
+            held_out.filter(|(row, _)| is_of_kind(*row)).unzip();
+        let lengths = errors.iter().map(nalgebra::Matrix::norm);
+        let median = median(lengths.filter(|length| length.is_finite())).unwrap_or(0.0);
+        let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
+        let text = format!(
+            "half of the held-out {} are missed by more than {}, {:.0} % of the spread of the \
+             fitted ones",
+            row_noun(kind),
+            format_error(kind, median, 1),
+            100.0 * median / spread
+        );
+        let numbers = [kind.into(), median.into(), spread.into()];
+        let finding = || {
+            let finding = Finding::new(FindingCode::HeldOutMissed, numbers, text);
+            match held_base(fitting) {
+                Some(base) => finding.with_remedy(format!(
+                    "base[{base}] is held where it is declared, while another base is free: \
+                     free it in [parameters], \"base[{base}].*\" = {{ free = true }}"
+                )),
+                None => match mistake(fit, &row_kind, (&rows, &errors)) {
+                    Some(words) => finding
+                        .with_remedy(format!("{words}; correct these rows, or hold out others")),
+                    None => finding,
+                },
+            }
         };
-        fit.kinds().into_iter().filter_map(of_kind).collect()
-    }
+        (spread > MIN_SPREAD && median > MAX_MISS * spread && median > noise).then(finding)
+    };
+    fit.kinds().into_iter().filter_map(of_kind).collect()
 }
 
 /// Returns the words for the mistake with which the fitted arm predicts held-out `rows` of a kind
@@ -241,11 +220,11 @@ pub(super) fn mistake(
     kind: &RowKind,
     (rows, errors): (&[usize], &[Vector3<f64>]),
 ) -> Option<String> {
-    let is_sound = fit.has_further_fits && Misfit.check(fit).is_empty();
+    let is_sound = fit.has_further_fits && misfit(fit).is_empty();
     if !(is_sound && kind.observation.is_position()) {
         return None;
     }
-    let fitted = fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, &fit.end.x));
+    let fitted = fit.rms_at(&kind.rows, &fit.end.x);
     let limit = (MAX_MISTAKEN_RATIO * fit.rms(rows, errors)).min(MAX_RATIO_TO_FITTED * fitted);
     MistakenRows { fit, x: &fit.end.x, rows, limit }.cause()
 }
@@ -267,38 +246,30 @@ fn held_base<'a>(fitting: &Fitting<'a>) -> Option<&'a str> {
 
 /// Checks that the fitted arm predicts held-out rows not much worse than the registered nominal
 /// arm.
-pub(super) struct BetterThanNominal;
-
-impl Check for BetterThanNominal {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let kind = fit.fitted.held_out.kind;
-        let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
-        let row_kind = fit.kinds().into_iter().find(|row_kind| row_kind.observation.kind() == kind);
-        let Some(RowKind { observation, taken_sigma, .. }) = row_kind else { return Vec::new() };
-        let noise = observation.expected_norm() * taken_sigma;
-        if !(after > MIN_ERROR_RATIO * before && after > MIN_NOISE_MULTIPLE * noise) {
-            return Vec::new();
-        }
-        let text = format!(
-            "the fitted arm misses held-out {} by more than the nominal arm ({} rms before, {} \
-             after)",
-            row_noun(kind),
-            format_error(kind, before, 3),
-            format_error(kind, after, 3)
-        );
-        let numbers = [kind.into(), before.into(), after.into()];
-        vec![Finding::new(FindingCode::HeldOutWorse, numbers, text)]
+pub(super) fn better_than_nominal(fit: &CheckedFit) -> Option<Finding> {
+    let kind = fit.fitted.held_out.kind;
+    let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
+    let row_kind = fit.kinds().into_iter().find(|row_kind| row_kind.observation.kind() == kind);
+    let Some(RowKind { observation, taken_sigma, .. }) = row_kind else { return None };
+    let noise = observation.expected_norm() * taken_sigma;
+    if !(after > MIN_ERROR_RATIO * before && after > MIN_NOISE_MULTIPLE * noise) {
+        return None;
     }
+    let text = format!(
+        "the fitted arm misses held-out {} by more than the nominal arm ({} rms before, {} \
+         after)",
+        row_noun(kind),
+        format_error(kind, before, 3),
+        format_error(kind, after, 3)
+    );
+    let numbers = [kind.into(), before.into(), after.into()];
+    Some(Finding::new(FindingCode::HeldOutWorse, numbers, text))
 }
 
 /// Checks that no held-out row has a prediction error too large to be noise.
-pub(super) struct WithoutOutliers;
-
-impl Check for WithoutOutliers {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let (rows, of) = (fit.held_out_outliers, fit.fitting.split.held_out.len());
-        if rows.is_empty() { Vec::new() } else { vec![finding_of(rows, of)] }
-    }
+pub(super) fn without_outliers(fit: &CheckedFit) -> Option<Finding> {
+    let (rows, of) = (fit.held_out_outliers, fit.fitting.split.held_out.len());
+    (!rows.is_empty()).then(|| finding_of(rows, of))
 }
 
 /// Returns the finding about held-out outliers `rows` among `of` held-out rows.
@@ -322,7 +293,7 @@ fn finding_of(rows: &[Outlier], of: usize) -> Finding {
         return finding;
     }
     finding.with_remedy(
-        "leave out corners that the detector misplaced, or weigh them less by [robust]".to_owned(),
+        "leave out corners that the detector misplaced, or weigh them less by [robust]",
     )
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::misread::MAX_RATIO_ERROR_OF_ARM;
 use super::row_kind::format_error;
@@ -49,26 +49,22 @@ const MAX_PRIOR_SIGMAS: f64 = 3.0;
 
 /// Checks that no parameter of the geometry that the problem holds, and no two of them, cause most of
 /// a misfit which contradicts the declared σ.
-pub(super) struct HeldGeometryIsRight;
-
-impl Check for HeldGeometryIsRight {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
-        let leading = fit.fitting.measurements.leading();
-        // Another reading of the table explains the misfit by itself, unless it is a small error of the
-        // arm or the instrument.
-        let reading = fit.explanations.get().and_then(|found| found.fitted.first());
-        let is_misread = reading.is_some_and(|reading| {
-            reading.effect.as_ref().is_none_or(|(_, size)| size.abs() >= MAX_RATIO_ERROR_OF_ARM)
-        });
-        if !(is_contradicted && fit.has_further_fits && leading.is_position())
-            || fit.fitting.earlier.is_some()
-            || is_misread
-        {
-            return Vec::new();
-        }
-        finding(fit, leading).into_iter().collect()
+pub(super) fn held_geometry_is_right(fit: &CheckedFit) -> Option<Finding> {
+    let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
+    let leading = fit.fitting.measurements.leading();
+    // Another reading of the table explains the misfit by itself, unless it is a small error of the
+    // arm or the instrument.
+    let reading = fit.explanations.get().and_then(|found| found.fitted.first());
+    let is_misread = reading.is_some_and(|reading| {
+        reading.effect.as_ref().is_none_or(|(_, size)| size.abs() >= MAX_RATIO_ERROR_OF_ARM)
+    });
+    if !(is_contradicted && fit.has_further_fits && leading.is_position())
+        || fit.fitting.earlier.is_some()
+        || is_misread
+    {
+        return None;
     }
+    finding(fit, leading)
 }
 
 /// Result of a fit to the identification rows.

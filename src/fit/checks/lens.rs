@@ -10,7 +10,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 use super::finding::Finding;
 use super::freed::Freed;
 use super::view_order::views;
-use crate::error::Location;
 use crate::fit::{Estimate, FindingCode, Identification, IdentifyError, Placement};
 use crate::measurement::Dataset;
 use crate::model::Model;
@@ -135,7 +134,7 @@ pub(in crate::fit) fn lens_finding(
         );
         let numbers = [json!(names), json!(before), json!(after)];
         let finding = Finding::new(FindingCode::LensContradicted, numbers, text);
-        return Some(finding.with_remedy("correct the camera".to_owned()));
+        return Some(finding.with_remedy("correct the camera"));
     }
     let numbers = [json!(names), json!(before), json!(after)];
     let remedy = format!("{}, or declare better ones", freeing(problem, &fixed));
@@ -194,7 +193,7 @@ fn freeing(problem: &Problem, names: &[String]) -> String {
         .partition(|name| rule(name).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed)));
     let mut lines: Vec<String> = Vec::new();
     for rule in held.into_iter().filter_map(rule) {
-        let place = Location { key: None, excerpt: None, ..rule.location.clone() };
+        let place = rule.location.of_line();
         let line = format!("\"{}\" ({place})", rule.pattern);
         if !lines.contains(&line) {
             lines.push(line);

@@ -2,9 +2,9 @@
 
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
-use super::row_kind::format_error;
+use super::row_kind::{format_error, listed};
 use crate::error::Location;
 use crate::fit::Noise;
 use crate::least_squares::solver::AtBound;
@@ -22,40 +22,32 @@ const MAX_NAMED: usize = 3;
 const AT_LIMIT: f64 = 1e-6;
 
 /// Checks that bounds and constraints do not cause most of a misfit that contradicts the declared σ.
-pub(super) struct LimitsHold;
-
-impl Check for LimitsHold {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
-        if !is_contradicted || !fit.has_further_fits || fit.fitting.earlier.is_some() {
-            return Vec::new();
-        }
-        let limits = suspected(fit);
-        if limits.is_empty() {
-            return Vec::new();
-        }
-        let kind = fit.kind(fit.fitting.measurements.leading());
-        let before = fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, &fit.end.x));
-        let after = fit.with_problem(&without_limits(fit.problem), |fitting| {
-            let end = fitting.run(&fitting.registered().ok()?).ok()?;
-            Some(fit.rms(&kind.rows, &fitting.position_errors(&kind.rows, &end.x)))
-        });
-        let Some(after) = after.flatten().filter(|after| *after < MAX_RATIO * before) else {
-            return Vec::new();
-        };
-        let more = limits.len().saturating_sub(MAX_NAMED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        let named = limits[..limits.len().min(MAX_NAMED)].join(", ");
-        let name = kind.observation.kind();
-        let text = format!(
-            "limits of the problem cause most of the misfit: {named}{more}; without limits the \
-             rms error is {} instead of {}",
-            format_error(name, after, 3),
-            format_error(name, before, 3)
-        );
-        let numbers = [json!(limits), before.into(), after.into()];
-        vec![Finding::new(FindingCode::LimitContradicted, numbers, text)]
+pub(super) fn limits_hold(fit: &CheckedFit) -> Option<Finding> {
+    let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
+    if !is_contradicted || !fit.has_further_fits || fit.fitting.earlier.is_some() {
+        return None;
     }
+    let limits = suspected(fit);
+    if limits.is_empty() {
+        return None;
+    }
+    let kind = fit.leading();
+    let before = fit.rms_at(&kind.rows, &fit.end.x);
+    let after = fit.with_problem(&without_limits(fit.problem), |fitting| {
+        let end = fitting.run(&fitting.registered().ok()?).ok()?;
+        Some(fit.rms(&kind.rows, &fitting.position_errors(&kind.rows, &end.x)))
+    });
+    let after = after.flatten().filter(|after| *after < MAX_RATIO * before)?;
+    let named = listed(&limits, MAX_NAMED);
+    let name = kind.observation.kind();
+    let text = format!(
+        "limits of the problem cause most of the misfit: {named}; without limits the \
+         rms error is {} instead of {}",
+        format_error(name, after, 3),
+        format_error(name, before, 3)
+    );
+    let numbers = [json!(limits), before.into(), after.into()];
+    Some(Finding::new(FindingCode::LimitContradicted, numbers, text))
 }
 
 /// Returns the limits on which the fit rests, and those that exclude the nominal arm, in words with
@@ -140,7 +132,7 @@ fn constraint_words(
 
 /// Returns file and line of a location.
 fn place(location: &Location) -> String {
-    Location { key: None, excerpt: None, ..location.clone() }.to_string()
+    location.of_line().to_string()
 }
 
 /// Returns the problem without bounds in `[parameters]` and without constraints.

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::misreading::POSITION_UNITS;
 use super::row_kind::{RowKind, format_error, quantity_noun, spread, suspects};
@@ -42,28 +42,23 @@ const MIN_POSES: usize = 4;
 /// Reports each kind of rows whose rms error after the fit exceeds [`MAX_MISS`] times the spread of
 /// the rows and [`MAX_UNREPORTED_RESIDUAL`] σ. Reports other rows than positions also if the fit is
 /// no better than the nominal arm and the error exceeds [`MIN_REPORTED_ERROR`] σ.
-pub(super) struct Misfit;
-
-impl Check for Misfit {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let of_kind = |kind: RowKind| {
-            let error = |x| fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, x));
-            let (nominal, fitted) = (error(fit.registered_x), error(&fit.end.x));
-            // A solver that did not converge may have increased the error, so its misfit is only
-            // reported if the nominal arm has one as well.
-            let counts = |_: &Finding| {
-                fit.end.termination.converged() || misfit_finding(&kind, nominal).is_some()
-            };
-            let finding = misfit_finding(&kind, fitted)
-                .filter(counts)
-                .or_else(|| no_better_finding(&kind, nominal, fitted))?;
-            Some(match reading_of_tilts(fit, &kind, fitted) {
-                Some(words) => finding.with_remedy(format!("the tilts fit with {words}")),
-                None => finding,
-            })
+pub(super) fn misfit(fit: &CheckedFit) -> Vec<Finding> {
+    let of_kind = |kind: RowKind| {
+        let error = |x| fit.rms_at(&kind.rows, x);
+        let (nominal, fitted) = (error(fit.registered_x), error(&fit.end.x));
+        // A solver that did not converge may have increased the error, so its misfit is only
+        // reported if the nominal arm has one as well.
+        let counts = |_: &Finding| {
+            fit.end.termination.converged() || misfit_finding(&kind, nominal).is_some()
         };
-        fit.kinds().into_iter().filter_map(of_kind).collect()
-    }
+        let finding = misfit_finding(&kind, fitted)
+            .filter(counts)
+            .or_else(|| no_better_finding(&kind, nominal, fitted))?;
+        Some(finding.with_remedy_of(
+            reading_of_tilts(fit, &kind, fitted).map(|words| format!("the tilts fit with {words}")),
+        ))
+    };
+    fit.kinds().into_iter().filter_map(of_kind).collect()
 }
 
 /// Function from the two numbers of a measured tilt \[rad\] to those that another reading means.
@@ -107,25 +102,20 @@ fn reading_of_tilts(fit: &CheckedFit, kind: &RowKind, rms: f64) -> Option<&'stat
 }
 
 /// Checks that the measured positions spread over a workspace of the nominal arm's size.
-pub(super) struct SizeOfArm;
-
-impl Check for SizeOfArm {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let of_kind = |kind: RowKind| {
-            let RowKind { observation, rows, .. } = &kind;
-            if !observation.is_position() || fit.poses.poses.min(rows.len()) < MIN_POSES {
-                return None;
-            }
-            let nominal = fit.fitting.position_errors(rows, fit.registered_x);
-            let table = &fit.fitting.measurements;
-            let positions = &table.positions;
-            let predicted = spread(fit.fitting.placement, rows, |place| {
-                positions[rows[place]] - nominal[place]
-            });
-            other_size_finding((kind.spread, predicted), table.position_unit)
-        };
-        fit.kinds().into_iter().filter_map(of_kind).collect()
-    }
+pub(super) fn size_of_arm(fit: &CheckedFit) -> Vec<Finding> {
+    let of_kind = |kind: RowKind| {
+        let RowKind { observation, rows, .. } = &kind;
+        if !observation.is_position() || fit.poses.poses.min(rows.len()) < MIN_POSES {
+            return None;
+        }
+        let nominal = fit.fitting.position_errors(rows, fit.registered_x);
+        let table = &fit.fitting.measurements;
+        let positions = &table.positions;
+        let predicted =
+            spread(fit.fitting.placement, rows, |place| positions[rows[place]] - nominal[place]);
+        other_size_finding((kind.spread, predicted), table.position_unit)
+    };
+    fit.kinds().into_iter().filter_map(of_kind).collect()
 }
 
 /// Returns the finding that the rms error `rms` of an arm is large relative to both the spread and

@@ -7,14 +7,12 @@ use nalgebra::{DVector, Vector3};
 use super::checked_fit::CheckedFit;
 use super::doubted_columns::{column_name, moving};
 use super::misreading::reading_of_rows;
-use super::registered_rows::registration_error;
+use super::row_kind::{AXES, listed};
 use crate::fit::SolverChoice;
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::stages::stage::Stage;
-use crate::measurement::Split;
 use crate::model::Pose;
 use crate::model::parameter::{Parameter, ParameterSite};
-use crate::problem::JointKind;
 
 /// Minimum number of rows that show where the base or the target stands.
 const MIN_MOVED_ROWS: usize = 6;
@@ -35,9 +33,6 @@ const LENGTH_FACTORS: [(f64, &str); 6] = [
     (25.4, "multiply them by 25.4"),
     (1.0 / 25.4, "divide them by 25.4"),
 ];
-
-/// Names of the coordinates of a position.
-const NAMES: [&str; 3] = ["x", "y", "z"];
 
 /// Rows that do not fit the arm of the other rows.
 pub(super) struct MistakenRows<'a, 'f> {
@@ -131,15 +126,12 @@ impl MistakenRows<'_, '_> {
         let squares: f64 = best.iter().map(|(_, error)| error.powi(2)).sum();
         let changed = self.rows.iter().zip(&best);
         let changed = changed.filter(|(row, (level, _))| column[**row].total_cmp(level).is_ne());
-        let listed =
+        let words =
             changed.map(|(&row, (level, _))| format!("{level} kg in {}", table.location(row)));
-        let listed: Vec<String> = listed.collect();
+        let words: Vec<String> = words.collect();
         let is_explained = (squares / self.rows.len() as f64).sqrt() < self.limit;
-        let more = listed.len().saturating_sub(MAX_LISTED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        let shown = listed[..listed.len().min(MAX_LISTED)].join(", ");
-        (is_explained && listed.len() > 1)
-            .then(|| format!("they fit with other payloads: {shown}{more}"))
+        (is_explained && words.len() > 1)
+            .then(|| format!("they fit with other payloads: {}", listed(&words, MAX_LISTED)))
     }
 
     /// Returns the words for positions that belong to the joint angles of other rows of the table. A
@@ -191,8 +183,7 @@ impl MistakenRows<'_, '_> {
         let Self { fit, x, rows: chosen, limit } = *self;
         let table = fit.fitting.measurements;
         let joints: Vec<usize> = moving(fit).collect();
-        let is_turning =
-            |joint: &usize| fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
+        let is_turning = |joint: &usize| fit.turns(*joint);
         let turning: Vec<usize> = joints.iter().copied().filter(is_turning).collect();
         let fits = |changed: &[usize], factor: f64| {
             let mut corrected = table.clone();
@@ -221,16 +212,15 @@ impl MistakenRows<'_, '_> {
 
     /// Returns the words for rows that fit where the target or the base, or both, stand elsewhere.
     fn of_moved_place(&self) -> Option<String> {
-        let (model, rows) = (self.fit.fitting.model, self.rows);
-        if rows.len() < MIN_MOVED_ROWS {
-            return None;
-        }
-        let split = Split { identification: rows.to_vec(), held_out: Vec::new() };
+        let table = self.fit.fitting.measurements;
+        let is_enough = self.rows.len() >= MIN_MOVED_ROWS;
+        is_enough.then(|| self.fit.with_rows(table, self.rows, |of| self.of_place_in(of)))?
+    }
+
+    /// Does the work of [`of_moved_place`](Self::of_moved_place) with the fit of these rows alone.
+    fn of_place_in(&self, fitting: &Fitting) -> Option<String> {
+        let (placement, model, rows) = (fitting.placement, fitting.model, self.rows);
         let is_base = |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
-        let Fitting { placement, measurements, .. } = *self.fit.fitting;
-        let held_out_only = placement.held_out_only(model, measurements, &split);
-        let declared = self.fit.fitting.with_declared_noise();
-        let fitting = Fitting { split: &split, turn_sigma: None, held_out_only, ..declared };
         // A base may have turned far.
         let located = fitting.located();
         let is_used = |parameter: &Parameter| match parameter.site {
@@ -309,7 +299,7 @@ impl MistakenRows<'_, '_> {
             for &row in self.rows {
                 converted.positions[row] *= factor;
             }
-            let rms = registration_error(self.fit, &converted, self.rows);
+            let rms = self.fit.registration_error(&converted, self.rows);
             rms.is_some_and(|rms| rms < self.limit)
         };
         let has_enough = self.rows.len() >= MIN_REGISTERED_ROWS;
@@ -342,7 +332,7 @@ fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String>
         })
     });
     if let Some(axis) = sign {
-        return Some(format!("their {} has the other sign", NAMES[axis]));
+        return Some(format!("their {} has the other sign", AXES[axis]));
     }
     let exchanged = [(0, 1), (0, 2), (1, 2)].into_iter().find(|&(first, second)| {
         fits(&|measured, _| {
@@ -352,7 +342,7 @@ fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String>
         })
     });
     if let Some((first, second)) = exchanged {
-        return Some(format!("their {} and {} are exchanged", NAMES[first], NAMES[second]));
+        return Some(format!("their {} and {} are exchanged", AXES[first], AXES[second]));
     }
     let mut factors = LENGTH_FACTORS.into_iter();
     if let Some((_, words)) = factors.find(|(factor, _)| fits(&|measured, _| measured * *factor)) {
@@ -365,5 +355,5 @@ fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String>
             corrected
         })
     });
-    axis.map(|axis| format!("their {} alone is wrong", NAMES[axis]))
+    axis.map(|axis| format!("their {} alone is wrong", AXES[axis]))
 }

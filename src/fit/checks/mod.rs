@@ -1,7 +1,7 @@
 //! Checks of a fit: is its result trustworthy, and which input should be examined?
 //!
-//! Each check is a type that implements [`checked_fit::Check`]; [`findings`] runs all of them.
-//! `docs/findings.md` lists the codes of their findings.
+//! Each check is a function of the fit; [`findings`] runs all of them. `docs/findings.md` lists the
+//! codes of their findings.
 
 pub(super) mod bounds;
 mod changed_rows;
@@ -38,7 +38,6 @@ mod pose_range;
 pub(super) mod pose_sufficiency;
 mod prediction;
 pub(super) mod priors;
-mod registered_rows;
 pub(super) mod required_columns;
 pub(super) mod row_kind;
 mod row_relation;
@@ -52,54 +51,62 @@ mod view_order;
 
 use serde_json::Value;
 
-use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
+use checked_fit::CheckedFit;
 use finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, OF_MISFIT, Severity};
 use misreading::first_of;
 
+/// Check of a fit: a function that returns its finding, or one for each case.
+enum Check {
+    One(fn(&CheckedFit) -> Option<Finding>),
+    Each(fn(&CheckedFit) -> Vec<Finding>),
+}
+
+use Check::{Each, One};
+
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
 /// print the first finding that is an error as the reason.
-const CHECKS: &[&dyn Check] = &[
-    &EnoughEquations,
-    &misread::ReadAsMeant,
-    &view_order::PointsInOrder,
-    &table_digits::PositionsAreMeasured,
-    &misfit::Misfit,
-    &misfit::SizeOfArm,
-    &orientation::OrientationsFit,
-    &doubted_columns::ColumnsHoldMeasurements,
-    &doubted_rows::RowsBelongTogether,
-    &changed_rows::RowsStayAlike,
-    &Convergence,
-    &two_solutions::OneSolution,
-    &common_scale::ScaleHolds,
-    &parameter_limits::WithinPriors,
-    &parameter_limits::WithinArmSize,
-    &held_out::NotAllCopied,
-    &held_out::HeldOutReached,
-    &held_out::BetterThanNominal,
-    &priors::PriorsHold,
-    &priors::NoiseIsDeclared,
-    &priors::DataDecide,
-    &pose_range::PosesSpread,
-    &nominal_error::NominalIsNear,
-    &parameter_limits::GivesWayToLoads,
-    &table_digits::CommandsHaveDigits,
-    &priors::SigmaIsNotOverstated,
-    &prediction::PredictionHolds,
-    &prediction::NotWorseThanNominal,
-    &prediction::PredictionIsSure,
-    &bounds::BoundsAreSeen,
-    &limits::LimitsHold,
-    &held_parameters::HeldGeometryIsRight,
-    &held_out::NotRepeated,
-    &held_out::OtherPosesHeldOut,
-    &held_out::WithoutOutliers,
-    &HeldOutPlaced,
-    &set_aside::SetAsideByChance,
-    &fitted_rows::SteadyPoints,
-    &fitted_rows::NoOutliers,
-    &priors::PriorWidths,
-    &open_directions::NamedDirections,
+const CHECKS: &[Check] = &[
+    One(|fit| fit.poses.finding.clone()),
+    One(misread::read_as_meant),
+    One(view_order::points_in_order),
+    One(table_digits::positions_are_measured),
+    Each(misfit::misfit),
+    Each(misfit::size_of_arm),
+    One(orientation::orientations_fit),
+    One(doubted_columns::columns_hold_measurements),
+    One(doubted_rows::rows_belong_together),
+    One(changed_rows::rows_stay_alike),
+    One(|fit| fit.not_converged.cloned()),
+    One(two_solutions::one_solution),
+    One(common_scale::scale_holds),
+    One(parameter_limits::within_priors),
+    One(parameter_limits::within_arm_size),
+    One(held_out::not_all_copied),
+    Each(held_out::held_out_reached),
+    One(held_out::better_than_nominal),
+    Each(priors::priors_hold),
+    One(priors::noise_is_declared),
+    One(priors::data_decide),
+    One(pose_range::poses_spread),
+    One(nominal_error::nominal_is_near),
+    One(parameter_limits::gives_way_to_loads),
+    One(table_digits::commands_have_digits),
+    One(priors::sigma_is_not_overstated),
+    One(prediction::prediction_holds),
+    One(prediction::not_worse_than_nominal),
+    One(prediction::prediction_is_sure),
+    Each(bounds::bounds_are_seen),
+    One(limits::limits_hold),
+    One(held_parameters::held_geometry_is_right),
+    One(held_out::not_repeated),
+    One(held_out::other_poses_held_out),
+    One(held_out::without_outliers),
+    One(|fit| fit.poses.held_out.clone()),
+    One(set_aside::set_aside_by_chance),
+    Each(fitted_rows::steady_points),
+    One(fitted_rows::no_outliers),
+    Each(priors::prior_widths),
+    Each(open_directions::named_directions),
 ];
 
 /// Codes of findings that name the cause of a misfit.
@@ -148,7 +155,11 @@ const BEYOND_NOISE: [FindingCode; 2] =
 
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
-    let mut findings: Vec<Finding> = CHECKS.iter().flat_map(|check| check.check(fit)).collect();
+    let found = |check: &Check| match check {
+        One(check) => check(fit).into_iter().collect(),
+        Each(check) => check(fit),
+    };
+    let mut findings: Vec<Finding> = CHECKS.iter().flat_map(found).collect();
     state_limits_first(&mut findings);
     // A change of one place says more about rows than that they contradict the others.
     let is_of_place = |found: &Finding| {
@@ -196,7 +207,7 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
                 } else {
                     format!("{text}; otherwise {}", finding.code.entry().remedy)
                 };
-                *finding = finding.clone().with_remedy(remedy);
+                finding.remedy = remedy;
             }
         }
     }
@@ -212,7 +223,7 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
                 || found.code == FindingCode::NominalFarOff
         };
         for finding in findings.iter_mut().filter(is_consequence) {
-            *finding = finding.clone().with_remedy(remedy.to_owned());
+            finding.remedy = remedy.to_owned();
         }
     } else if cause_text.is_none() {
         let remedy = if fit.ignores_elasticity() {
@@ -225,7 +236,7 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         };
         let is_of_strategy = |found: &&mut Finding| OF_STRATEGY.contains(&found.code);
         for finding in findings.iter_mut().filter(is_of_strategy).filter(|_| !remedy.is_empty()) {
-            *finding = finding.clone().with_remedy(remedy.to_owned());
+            finding.remedy = remedy.to_owned();
         }
     }
     state_held_out_remedies(&mut findings);
@@ -262,7 +273,7 @@ fn state_limits_first(findings: &mut [Finding]) {
         );
         let remedy = "check the limits first";
         let stated = Finding { text, ..findings[misread].clone() };
-        findings[misread] = stated.with_remedy(remedy.to_owned());
+        findings[misread] = stated.with_remedy(remedy);
     }
 }
 
@@ -283,7 +294,7 @@ fn state_explanations(findings: &mut [Finding]) {
             "{suspect}, with which the nominal arm misses far less; otherwise {}",
             finding.remedy
         );
-        *finding = finding.clone().with_remedy(remedy);
+        finding.remedy = remedy;
     }
 }
 
@@ -308,7 +319,7 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             && is_of_fixture
             && has_readings.is_none_or(Vec::is_empty)
         {
-            *finding = finding.clone().with_remedy(BEYOND_PRIOR_FIRST.to_owned());
+            finding.remedy = BEYOND_PRIOR_FIRST.to_owned();
         }
         // Remedies that name a cause stay.
         if finding.remedy != finding.code.entry().remedy {
@@ -336,6 +347,6 @@ fn state_held_out_remedies(findings: &mut [Finding]) {
             }
             _ => continue,
         };
-        *finding = finding.clone().with_remedy(remedy.to_owned());
+        finding.remedy = remedy.to_owned();
     }
 }

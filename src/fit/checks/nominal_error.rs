@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::misreading::{Explanations, Misreading, first_of, is_of_views};
 use super::row_kind::{RowKind, format_error, quantity_noun, suspects};
@@ -31,10 +31,6 @@ const MAX_SIZE_DIFFERENCE: f64 = 0.05;
 /// Smallest difference from 1 of these ratios at which the images have another size.
 const MIN_SIZE_ERROR: f64 = 0.1;
 
-/// Checks that the error of the registered nominal arm is small relative to the spread of the
-/// measurements.
-pub(super) struct NominalIsNear;
-
 /// Returns the error of the registered nominal arm in rows of the leading kind (positions, if there
 /// are any): the rms error, or the median error of images, because a view from near may have errors
 /// far above those of all others.
@@ -50,7 +46,7 @@ fn nominal_miss(fit: &CheckedFit) -> f64 {
 /// [`MAX_NOMINAL_MISS`] times their spread.
 pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
     let rms = nominal_miss(fit);
-    let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
+    let RowKind { observation, spread, .. } = fit.leading();
     let is_measured_directly = observation.is_measured_directly();
     let min_spread =
         if is_measured_directly { 0.0 } else { MIN_RELATIVE_SPREAD * fit.fitting.model.reach() };
@@ -83,22 +79,19 @@ impl CheckedFit<'_> {
     }
 }
 
-impl Check for NominalIsNear {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        if !is_nominal_far_off(fit) {
-            return Vec::new();
-        }
-        let rms = nominal_miss(fit);
-        let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
-        let kind = observation.kind();
-        let Explanations { near, near_error, .. } = fit.explanations();
-        let explanations = (&near[..], *near_error);
-        let finding = far_off_finding(kind, (rms, spread), fit.is_base_free(), explanations);
-        vec![match image_size(fit).filter(|_| near.is_empty()) {
-            Some(words) => finding.with_remedy(words),
-            None => finding,
-        }]
+/// Checks that the error of the registered nominal arm is small relative to the spread of the
+/// measurements.
+pub(super) fn nominal_is_near(fit: &CheckedFit) -> Option<Finding> {
+    if !is_nominal_far_off(fit) {
+        return None;
     }
+    let rms = nominal_miss(fit);
+    let RowKind { observation, spread, .. } = fit.leading();
+    let kind = observation.kind();
+    let Explanations { near, near_error, .. } = fit.explanations();
+    let explanations = (&near[..], *near_error);
+    let finding = far_off_finding(kind, (rms, spread), fit.is_base_free(), explanations);
+    Some(finding.with_remedy_of(image_size(fit).filter(|_| near.is_empty())))
 }
 
 /// Returns the remedy for a camera whose focal lengths and image centre are all fitted at one
@@ -141,7 +134,7 @@ fn far_off_finding(
     if !rms.is_finite() {
         let text = "the nominal arm misses the measurements by more than can be computed";
         return Finding::new(FindingCode::NominalFarOff, numbers, text.to_owned())
-            .with_remedy("check their units".to_owned());
+            .with_remedy("check their units");
     }
     let (what, by, part) = (quantity_noun(kind), format_error(kind, rms, 1), rms / spread);
     let part = if part < MAX_PERCENTAGE {

@@ -8,10 +8,11 @@
 use nalgebra::{DMatrix, DVector, RowDVector};
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::open_scale::scaled_lengths;
 use super::open_views;
+use super::row_kind::listed;
 use crate::fit::stages::parameter_size::plausible_size;
 use crate::least_squares::{UnidentifiableCombination, Weak};
 use crate::measurement::Measurements;
@@ -101,71 +102,66 @@ impl Open {
 
 /// Check that reports the combinations of unknowns which the rows do not determine, if some rows
 /// measure anything but positions.
-pub(super) struct NamedDirections;
-
-impl Check for NamedDirections {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let are_positions = fit.kinds().iter().all(|kind| kind.observation.is_position());
-        let parameters: Vec<&Parameter> = fit.whole.parameters().collect();
-        if are_positions {
-            let is_set_up =
-                |k: &usize| is_base(&parameters[*k].name) || is_tool(&parameters[*k].name);
-            let set_up: Vec<usize> = (0..parameters.len()).filter(is_set_up).collect();
-            return open_views::undecided_set_up(fit, &set_up).into_iter().collect();
-        }
-        let model = fit.fitting.model;
-        let size = |parameter: &&Parameter| {
-            let without_prior = Parameter { sigma: None, ..(*parameter).clone() };
-            plausible_size(model, &without_prior).unwrap_or(match parameter.unit() {
-                Unit::Length => model.reach(),
-                Unit::Pixel => PLAUSIBLE_PIXELS,
-                _ => 1.0,
-            })
-        };
-        let sizes: Vec<f64> = parameters.iter().map(size).collect();
-        let plausible_sizes: Vec<Option<f64>> = sizes.iter().copied().map(Some).collect();
-        let rows = Weak::of(fit.triangle, &plausible_sizes)
-            .map_or_else(|| DMatrix::zeros(0, sizes.len()), |weak| weak.rows);
-        let scaled = DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, j| rows[(i, j)] * sizes[j]);
-        let names: Vec<&str> = parameters.iter().map(|parameter| &*parameter.name).collect();
-        let finding = |OpenQuantity { kind, names: involved, unknowns }: OpenQuantity| {
-            let focal = kind == Open::Focal;
-            let poses = unknowns.into_iter().filter(|&k| is_fixture(names[k])).collect::<Vec<_>>();
-            if (focal || kind == Open::Views)
-                && let Some(finding) = open_views::undecided(fit, &poses, (&involved, focal))
-            {
-                return finding;
-            }
-            let [text, remedy] = kind.words(&listed(&involved));
-            let numbers = [json!(kind.word()), json!(involved)];
-            Finding::new(FindingCode::NotToldApart, numbers, text).with_remedy(remedy)
-        };
-        let mut open = open_directions(&scaled, &names);
-        if knows_a_length(fit.problem) {
-            for quantity in open.iter_mut().filter(|quantity| quantity.kind == Open::Scale) {
-                quantity.kind = Open::Apart;
-            }
-        }
-        // The nominal arm misses contacts, so that another scale changes the data there.
-        if open.iter().all(|quantity| quantity.kind != Open::Scale) {
-            let lengths = scaled_lengths(fit.problem, fit.fitting.measurements, &names);
-            let scale = |names| OpenQuantity { kind: Open::Scale, names, unknowns: Vec::new() };
-            open.extend(lengths.map(scale));
-        }
-        let mut findings: Vec<Finding> = open.into_iter().map(finding).collect();
-        // A pose that the rows determine only within decimetres is open, too.
-        let is_vague = |&k: &usize| {
-            is_fixture(names[k])
-                && fit.statistics.determined[k]
-                && fit.statistics.errors[k] > open_views::MAX_POSE_ERROR
-        };
-        let vague: Vec<usize> = (0..names.len()).filter(is_vague).collect();
-        if findings.iter().all(|finding| finding.code != FindingCode::ViewsUndecided) {
-            let involved: Vec<String> = vague.iter().map(|&k| names[k].to_owned()).collect();
-            findings.extend(open_views::undecided(fit, &vague, (&involved, false)));
-        }
-        findings
+pub(super) fn named_directions(fit: &CheckedFit) -> Vec<Finding> {
+    let are_positions = fit.kinds().iter().all(|kind| kind.observation.is_position());
+    let parameters: Vec<&Parameter> = fit.whole.parameters().collect();
+    if are_positions {
+        let is_set_up = |k: &usize| is_base(&parameters[*k].name) || is_tool(&parameters[*k].name);
+        let set_up: Vec<usize> = (0..parameters.len()).filter(is_set_up).collect();
+        return open_views::undecided_set_up(fit, &set_up).into_iter().collect();
     }
+    let model = fit.fitting.model;
+    let size = |parameter: &&Parameter| {
+        let without_prior = Parameter { sigma: None, ..(*parameter).clone() };
+        plausible_size(model, &without_prior).unwrap_or(match parameter.unit() {
+            Unit::Length => model.reach(),
+            Unit::Pixel => PLAUSIBLE_PIXELS,
+            _ => 1.0,
+        })
+    };
+    let sizes: Vec<f64> = parameters.iter().map(size).collect();
+    let plausible_sizes: Vec<Option<f64>> = sizes.iter().copied().map(Some).collect();
+    let rows = Weak::of(fit.triangle, &plausible_sizes)
+        .map_or_else(|| DMatrix::zeros(0, sizes.len()), |weak| weak.rows);
+    let scaled = DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, j| rows[(i, j)] * sizes[j]);
+    let names: Vec<&str> = parameters.iter().map(|parameter| &*parameter.name).collect();
+    let finding = |OpenQuantity { kind, names: involved, unknowns }: OpenQuantity| {
+        let focal = kind == Open::Focal;
+        let poses = unknowns.into_iter().filter(|&k| is_fixture(names[k])).collect::<Vec<_>>();
+        if (focal || kind == Open::Views)
+            && let Some(finding) = open_views::undecided(fit, &poses, (&involved, focal))
+        {
+            return finding;
+        }
+        let [text, remedy] = kind.words(&listed(&involved, MAX_NAMED));
+        let numbers = [json!(kind.word()), json!(involved)];
+        Finding::new(FindingCode::NotToldApart, numbers, text).with_remedy(remedy)
+    };
+    let mut open = open_directions(&scaled, &names);
+    if knows_a_length(fit.problem) {
+        for quantity in open.iter_mut().filter(|quantity| quantity.kind == Open::Scale) {
+            quantity.kind = Open::Apart;
+        }
+    }
+    // The nominal arm misses contacts, so that another scale changes the data there.
+    if open.iter().all(|quantity| quantity.kind != Open::Scale) {
+        let lengths = scaled_lengths(fit.problem, fit.fitting.measurements, &names);
+        let scale = |names| OpenQuantity { kind: Open::Scale, names, unknowns: Vec::new() };
+        open.extend(lengths.map(scale));
+    }
+    let mut findings: Vec<Finding> = open.into_iter().map(finding).collect();
+    // A pose that the rows determine only within decimetres is open, too.
+    let is_vague = |&k: &usize| {
+        is_fixture(names[k])
+            && fit.statistics.determined[k]
+            && fit.statistics.errors[k] > open_views::MAX_POSE_ERROR
+    };
+    let vague: Vec<usize> = (0..names.len()).filter(is_vague).collect();
+    if findings.iter().all(|finding| finding.code != FindingCode::ViewsUndecided) {
+        let involved: Vec<String> = vague.iter().map(|&k| names[k].to_owned()).collect();
+        findings.extend(open_views::undecided(fit, &vague, (&involved, false)));
+    }
+    findings
 }
 
 /// Returns true if the problem declares a length between points: a `[[distance]]`, or a marker of
@@ -182,7 +178,7 @@ pub(crate) fn open_scale(
     unknowns: &[&str],
 ) -> Option<String> {
     let lengths = scaled_lengths(problem, table, unknowns)?;
-    Some(Open::Scale.words(&listed(&lengths)).join("; "))
+    Some(Open::Scale.words(&listed(&lengths, MAX_NAMED)).join("; "))
 }
 
 /// Returns a sentence with a remedy for each kind of quantity that unidentifiable `combinations` of
@@ -201,7 +197,7 @@ pub(crate) fn open_quantities(
     if !names.iter().any(|name| is_fixture(name)) {
         return Vec::new();
     }
-    let sentence = |open: OpenQuantity| open.kind.words(&listed(&open.names)).join("; ");
+    let sentence = |open: OpenQuantity| open.kind.words(&listed(&open.names, MAX_NAMED)).join("; ");
     open_directions(&rows, &names).into_iter().map(sentence).collect()
 }
 
@@ -399,13 +395,6 @@ fn involved(unknowns: &[usize], names: &[&str]) -> Vec<String> {
         }
     }
     involved
-}
-
-/// Joins names for a sentence; if there are many, the last ones are replaced by their number.
-fn listed(names: &[String]) -> String {
-    let more = names.len().saturating_sub(MAX_NAMED);
-    let shown = names[..names.len() - more].join(", ");
-    if more > 0 { format!("{shown} and {more} more") } else { shown }
 }
 
 #[cfg(test)]

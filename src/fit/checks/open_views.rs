@@ -64,8 +64,7 @@ pub(super) fn undecided(
     Some(if has_focal {
         finding.with_remedy(
             "view the marker at an angle of 30° and more, hold fx and fy, or give them priors \
-             (sigma_px)"
-                .to_owned(),
+             (sigma_px)",
         )
     } else {
         finding

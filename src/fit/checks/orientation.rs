@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::convention::{IN_RADIANS, MAX_EXPLAINED_RATIO, fitting_conventions};
 use super::finding::{Finding, FindingCode};
 use super::priors::MAX_NOISE_FACTOR;
@@ -18,46 +18,40 @@ const MIN_SIGMAS: f64 = 20.0;
 const DEGREE_RATIOS: std::ops::Range<f64> = 40.0..80.0;
 
 /// Checks that the predicted orientations of the fitted arm are near the measured ones.
-pub(super) struct OrientationsFit;
-
-impl Check for OrientationsFit {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let Some(sigma) = fit.whole.declared_turn else { return Vec::new() };
-        let fitting = fit.fitting;
-        let rows = &fitting.split.identification;
-        let turns = fitting.model.orientation_residuals(fitting.poses(rows), &fit.end.x);
-        let lengths: Vec<f64> = turns
-            .iter()
-            .map(nalgebra::Matrix::norm_squared)
-            .filter(|square| square.is_finite())
-            .collect();
-        let rms = (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).sqrt();
-        if !(rms > MIN_SUSPECT_ANGLE && rms > MIN_SIGMAS * sigma) {
-            return of_sigma(fit, rms / 3_f64.sqrt(), sigma).into_iter().collect();
-        }
-        let conventions = fitting_conventions(fit, rms);
-        let text = format!(
-            "the fitted arm misses the measured orientations by {:.1}° rms, {:.0} times the \
-             declared σ",
-            rms.to_degrees(),
-            rms / sigma
-        );
-        let numbers = [rms.into(), sigma.into(), json!(conventions)];
-        let finding = Finding::new(FindingCode::OrientationMisfit, numbers, text);
-        vec![match conventions.first() {
-            Some(convention) if convention == IN_RADIANS => finding.with_remedy(format!(
-                "the columns fit as {convention}: call them rx_rad, ry_rad and rz_rad"
-            )),
-            Some(convention) => finding.with_remedy(format!(
-                "the measured orientations fit if the columns are read as {convention}: correct \
-                 the order or the meaning of the columns"
-            )),
-            None => match mistaken_orientations(fit, MAX_EXPLAINED_RATIO * rms) {
-                Some(words) => finding.with_remedy(words),
-                None => finding,
-            },
-        }]
+pub(super) fn orientations_fit(fit: &CheckedFit) -> Option<Finding> {
+    let sigma = fit.whole.declared_turn?;
+    let fitting = fit.fitting;
+    let rows = &fitting.split.identification;
+    let turns = fitting.model.orientation_residuals(fitting.poses(rows), &fit.end.x);
+    let lengths: Vec<f64> = turns
+        .iter()
+        .map(nalgebra::Matrix::norm_squared)
+        .filter(|square| square.is_finite())
+        .collect();
+    let rms = (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).sqrt();
+    if !(rms > MIN_SUSPECT_ANGLE && rms > MIN_SIGMAS * sigma) {
+        return of_sigma(fit, rms / 3_f64.sqrt(), sigma);
     }
+    let conventions = fitting_conventions(fit, rms);
+    let text = format!(
+        "the fitted arm misses the measured orientations by {:.1}° rms, {:.0} times the \
+         declared σ",
+        rms.to_degrees(),
+        rms / sigma
+    );
+    let numbers = [rms.into(), sigma.into(), json!(conventions)];
+    let finding = Finding::new(FindingCode::OrientationMisfit, numbers, text);
+    let remedy = match conventions.first() {
+        Some(convention) if convention == IN_RADIANS => {
+            Some(format!("the columns fit as {convention}: call them rx_rad, ry_rad and rz_rad"))
+        }
+        Some(convention) => Some(format!(
+            "the measured orientations fit if the columns are read as {convention}: correct \
+             the order or the meaning of the columns"
+        )),
+        None => mistaken_orientations(fit, MAX_EXPLAINED_RATIO * rms),
+    };
+    Some(finding.with_remedy_of(remedy))
 }
 
 /// Returns the finding that the orientations scatter by far more than their declared `sigma`

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::contradicted_entry::contradicted_entry;
 use super::finding::{Finding, FindingCode};
 use super::nominal_error::is_nominal_far_off;
@@ -50,66 +50,55 @@ pub(super) fn prior_sigmas(parameter: &Parameter, x: f64) -> Option<f64> {
 
 /// Checks that no parameter of the arm or of its fixtures deviates by more than
 /// [`MAX_PRIOR_SIGMAS`] σ of its prior.
-pub(super) struct WithinPriors;
-
-impl Check for WithinPriors {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let of_fixture = |parameter: &Parameter, x: f64| {
-            let is_fixture = matches!(parameter.site, ParameterSite::Fixture { .. });
-            let is_declared = is_fixture && parameter.regressor.is_constant();
-            Some(x.abs() / parameter.sigma.filter(|_| is_declared)?)
-        };
-        let is_far = |parameter: &Parameter, x: f64| {
-            prior_sigmas(parameter, x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
-        };
-        let finding = |(parameter, sigmas): (&Parameter, f64)| {
-            let name = &parameter.name;
-            let x = fitted_deviation(fit, parameter);
-            let text =
-                format!("{name} deviates from nominal by {sigmas:.0} times the σ of its prior");
-            let numbers = [name.as_str().into(), sigmas.into()];
-            if let (ParameterSite::Fixture { fixture, kind, axis }, Some(x)) = (parameter.site, x) {
-                let text = format!("{text}{}", values_in_words(parameter, x));
-                return Finding::new(FindingCode::BeyondPrior, numbers, text)
-                    .with_remedy(fixture_remedy(fit, fixture, (kind, axis)));
+pub(super) fn within_priors(fit: &CheckedFit) -> Option<Finding> {
+    let of_fixture = |parameter: &Parameter, x: f64| {
+        let is_fixture = matches!(parameter.site, ParameterSite::Fixture { .. });
+        let is_declared = is_fixture && parameter.regressor.is_constant();
+        Some(x.abs() / parameter.sigma.filter(|_| is_declared)?)
+    };
+    let is_far = |parameter: &Parameter, x: f64| {
+        prior_sigmas(parameter, x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
+    };
+    let finding = |(parameter, sigmas): (&Parameter, f64)| {
+        let name = &parameter.name;
+        let x = fitted_deviation(fit, parameter);
+        let text = format!("{name} deviates from nominal by {sigmas:.0} times the σ of its prior");
+        let numbers = [name.as_str().into(), sigmas.into()];
+        if let (ParameterSite::Fixture { fixture, kind, axis }, Some(x)) = (parameter.site, x) {
+            let text = format!("{text}{}", values_in_words(parameter, x));
+            return Finding::new(FindingCode::BeyondPrior, numbers, text)
+                .with_remedy(fixture_remedy(fit, fixture, (kind, axis)));
+        }
+        let entry = x.and_then(|x| contradicted_entry(fit, (parameter, x), is_far));
+        if let Some(entry) = entry {
+            let text = format!("{text}: {}", entry.words);
+            return Finding::new(FindingCode::BeyondPrior, numbers, text).with_remedy(entry.remedy);
+        }
+        let values = x.map_or_else(String::new, |x| values_in_words(parameter, x));
+        let finding = Finding::new(FindingCode::BeyondPrior, numbers, format!("{text}{values}"));
+        let further = lengths_beyond(fit, is_far).saturating_sub(1);
+        if further >= MIN_FURTHER_LENGTHS && is_nominal_far_off(fit) {
+            return finding.with_remedy(format!(
+                "so do {further} further lengths of the arm: check whether the table is one of this \
+                 arm, then axes of the measuring frame, signs of joints, units, and the priors"
+            ));
+        }
+        let finding = finding.with_remedy_of(remedy(fit, parameter, sigmas));
+        match wider_priors(fit, parameter) {
+            Some(rules) => {
+                let remedy = format!(
+                    "{}; if the arm may be so far from nominal, write in [parameters] {rules}",
+                    finding.remedy
+                );
+                finding.with_remedy(remedy)
             }
-            let entry = x.and_then(|x| contradicted_entry(fit, (parameter, x), is_far));
-            if let Some(entry) = entry {
-                let text = format!("{text}: {}", entry.words);
-                return Finding::new(FindingCode::BeyondPrior, numbers, text)
-                    .with_remedy(entry.remedy);
-            }
-            let values = x.map_or_else(String::new, |x| values_in_words(parameter, x));
-            let finding =
-                Finding::new(FindingCode::BeyondPrior, numbers, format!("{text}{values}"));
-            let further = lengths_beyond(fit, is_far).saturating_sub(1);
-            if further >= MIN_FURTHER_LENGTHS && is_nominal_far_off(fit) {
-                return finding.with_remedy(format!(
-                    "so do {further} further lengths of the arm: check whether the table is one of this \
-                     arm, then axes of the measuring frame, signs of joints, units, and the priors"
-                ));
-            }
-            let finding = match remedy(fit, parameter, sigmas) {
-                Some(remedy) => finding.with_remedy(remedy),
-                None => finding,
-            };
-            match wider_priors(fit, parameter) {
-                Some(rules) => {
-                    let remedy = format!(
-                        "{}; if the arm may be so far from nominal, write in [parameters] {rules}",
-                        finding.remedy
-                    );
-                    finding.with_remedy(remedy)
-                }
-                None => finding,
-            }
-        };
-        let ratio = |parameter: &Parameter, x| {
-            prior_sigmas(parameter, x).or_else(|| of_fixture(parameter, x))
-        };
-        let largest = largest_ratio(fit, ratio).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
-        largest.map(finding).into_iter().collect()
-    }
+            None => finding,
+        }
+    };
+    let ratio =
+        |parameter: &Parameter, x| prior_sigmas(parameter, x).or_else(|| of_fixture(parameter, x));
+    let largest = largest_ratio(fit, ratio).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
+    largest.map(finding)
 }
 
 /// Returns the remedy for number `axis` of a fixture that deviates far from its declared value; it
@@ -311,87 +300,74 @@ fn euler_remedy(fit: &CheckedFit, base: usize) -> Option<String> {
 
 /// Checks that no parameter deviates from nominal by more than is possible on this arm. Limits are
 /// its reach for a length, half a turn for an angle, and a factor of 100 for a stiffness.
-pub(super) struct WithinArmSize;
-
-impl Check for WithinArmSize {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let model = fit.fitting.model;
-        let ratio =
-            |parameter: &Parameter, x: f64| Some(x.abs() / largest_deviation(model, parameter)?);
-        let finding = |(parameter, sizes): (&Parameter, f64)| {
-            let unit = match parameter.unit() {
-                Unit::Length => "the arm's own size",
-                Unit::Angle => "half a turn",
-                _ => "a factor of 100",
-            };
-            let name = &parameter.name;
-            let text = format!(
-                "{name} deviates from nominal by {sizes:.1} times {unit}: more than is possible \
-                 on an arm"
-            );
-            let numbers = [name.as_str().into(), sizes.into()];
-            Finding::new(FindingCode::BeyondArmSize, numbers, text)
+pub(super) fn within_arm_size(fit: &CheckedFit) -> Option<Finding> {
+    let model = fit.fitting.model;
+    let ratio =
+        |parameter: &Parameter, x: f64| Some(x.abs() / largest_deviation(model, parameter)?);
+    let finding = |(parameter, sizes): (&Parameter, f64)| {
+        let unit = match parameter.unit() {
+            Unit::Length => "the arm's own size",
+            Unit::Angle => "half a turn",
+            _ => "a factor of 100",
         };
-        let largest = largest_ratio(fit, ratio).filter(|(_, sizes)| *sizes > 1.0);
-        largest.map(finding).into_iter().collect()
-    }
+        let name = &parameter.name;
+        let text = format!(
+            "{name} deviates from nominal by {sizes:.1} times {unit}: more than is possible \
+             on an arm"
+        );
+        let numbers = [name.as_str().into(), sizes.into()];
+        Finding::new(FindingCode::BeyondArmSize, numbers, text)
+    };
+    let largest = largest_ratio(fit, ratio).filter(|(_, sizes)| *sizes > 1.0);
+    largest.map(finding)
 }
-
-/// Checks that no joint gives way against its load: no compliance, declared part included, is
-/// negative by more than [`MAX_NEGATIVE_SIGMAS`] standard errors.
-pub(super) struct GivesWayToLoads;
 
 /// Largest number of standard errors by which a compliance may be below 0 without a report.
 const MAX_NEGATIVE_SIGMAS: f64 = 5.0;
 
-impl Check for GivesWayToLoads {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let of_unknown = |(place, &k): (usize, &usize)| {
-            let parameter = &fit.fitting.model.parameters[k];
-            let ParameterSite::Joint { joint, field: JointField::Compliance } = parameter.site
-            else {
-                return None;
-            };
-            let stiffness = fit.problem.joints.get(joint)?.stiffness;
-            let declared = stiffness.map_or(0.0, f64::recip);
-            let compliance = declared + fit.end.x[k];
-            let sigmas = -compliance / fit.covariance[(place, place)].sqrt();
-            (parameter.regressor.is_constant() && sigmas.is_finite())
-                .then_some((parameter, compliance, sigmas))
+/// Checks that no joint gives way against its load: no compliance, declared part included, is
+/// negative by more than [`MAX_NEGATIVE_SIGMAS`] standard errors.
+pub(super) fn gives_way_to_loads(fit: &CheckedFit) -> Option<Finding> {
+    let of_unknown = |(place, &k): (usize, &usize)| {
+        let parameter = &fit.fitting.model.parameters[k];
+        let ParameterSite::Joint { joint, field: JointField::Compliance } = parameter.site else {
+            return None;
         };
-        let unknowns = fit.whole.unknowns.iter().enumerate();
-        let tested: Vec<(&Parameter, f64, f64)> = unknowns.filter_map(of_unknown).collect();
-        let worst = tested.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2));
-        // Gravity the other way turns the sign of every compliance.
-        let is_opposite = tested.iter().all(|(_, _, sigmas)| *sigmas > -MAX_NEGATIVE_SIGMAS);
-        let finding = |(parameter, compliance, sigmas): (&Parameter, f64, f64)| {
-            let name = &parameter.name;
-            let text = format!(
-                "{name} is {:.3} µrad/(N·m), {sigmas:.0} standard errors below 0: the arm bends \
-                 against its load",
-                compliance * 1e6
-            );
-            let numbers = [name.as_str().into(), compliance.into(), sigmas.into()];
-            let finding = Finding::new(FindingCode::GivesWayUpwards, numbers, text);
-            let gravity = fit.problem.gravity;
-            if !is_opposite || gravity.norm() == 0.0 {
-                return finding;
-            }
-            let axes: Vec<String> = gravity.iter().map(|axis| (0.0 - axis).to_string()).collect();
-            let remedy = format!(
-                "if the arm hangs from a ceiling, or the sign of gravity is wrong, write \
-                 gravity_m_s2 = [{}], with which it bends under its load; otherwise check the \
-                 places of masses and payload, and whether a spring, counterweight or hoist is missing",
-                axes.join(", ")
-            );
-            finding.with_remedy(remedy)
-        };
-        worst
-            .filter(|(_, _, sigmas)| *sigmas > MAX_NEGATIVE_SIGMAS)
-            .map(finding)
-            .into_iter()
-            .collect()
-    }
+        let stiffness = fit.problem.joints.get(joint)?.stiffness;
+        let declared = stiffness.map_or(0.0, f64::recip);
+        let compliance = declared + fit.end.x[k];
+        let sigmas = -compliance / fit.covariance[(place, place)].sqrt();
+        (parameter.regressor.is_constant() && sigmas.is_finite())
+            .then_some((parameter, compliance, sigmas))
+    };
+    let unknowns = fit.whole.unknowns.iter().enumerate();
+    let tested: Vec<(&Parameter, f64, f64)> = unknowns.filter_map(of_unknown).collect();
+    let worst = tested.iter().copied().max_by(|a, b| a.2.total_cmp(&b.2));
+    // Gravity the other way turns the sign of every compliance.
+    let is_opposite = tested.iter().all(|(_, _, sigmas)| *sigmas > -MAX_NEGATIVE_SIGMAS);
+    let finding = |(parameter, compliance, sigmas): (&Parameter, f64, f64)| {
+        let name = &parameter.name;
+        let text = format!(
+            "{name} is {:.3} µrad/(N·m), {sigmas:.0} standard errors below 0: the arm bends \
+             against its load",
+            compliance * 1e6
+        );
+        let numbers = [name.as_str().into(), compliance.into(), sigmas.into()];
+        let finding = Finding::new(FindingCode::GivesWayUpwards, numbers, text);
+        let gravity = fit.problem.gravity;
+        if !is_opposite || gravity.norm() == 0.0 {
+            return finding;
+        }
+        let axes: Vec<String> = gravity.iter().map(|axis| (0.0 - axis).to_string()).collect();
+        let remedy = format!(
+            "if the arm hangs from a ceiling, or the sign of gravity is wrong, write \
+             gravity_m_s2 = [{}], with which it bends under its load; otherwise check the \
+             places of masses and payload, and whether a spring, counterweight or hoist is missing",
+            axes.join(", ")
+        );
+        finding.with_remedy(remedy)
+    };
+    worst.filter(|(_, _, sigmas)| *sigmas > MAX_NEGATIVE_SIGMAS).map(finding)
 }
 
 /// Returns the parameter for which `ratio` is largest, with that ratio. `ratio` returns the

@@ -4,12 +4,11 @@ use std::collections::BTreeSet;
 
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::doubted_columns::{column_name, moving, still_joints};
 use super::finding::{Finding, FindingCode};
-use super::misfit::Misfit;
+use super::misfit::misfit;
 use crate::observation::Needs;
-use crate::problem::JointKind;
 
 /// Largest range of the commands of every turning joint at which all poses are alike: 10° \[rad\].
 const MAX_ALIKE_TURN: f64 = 10.0 * std::f64::consts::PI / 180.0;
@@ -22,72 +21,64 @@ const MAX_OFF_AXIS: f64 = 1e-3;
 const MIN_ROWS: usize = 3;
 
 /// Checks that every joint moves in the fitted rows, and that not all poses are alike.
-pub(super) struct PosesSpread;
-
-impl Check for PosesSpread {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let table = fit.fitting.measurements;
-        let is_of_arm = |row: &&usize| table.observation(**row).is_of_arm();
-        let rows: Vec<usize> =
-            fit.fitting.split.identification.iter().filter(is_of_arm).copied().collect();
-        // If the fit is far off, a joint that stands still is a column in doubt.
-        if rows.len() < MIN_ROWS || !Misfit.check(fit).is_empty() {
-            return Vec::new();
-        }
-        let range = |joint: usize| {
-            let values = rows.iter().map(|&row| table.configuration(row)[joint]);
-            let (low, high) = crate::numeric::range(values);
-            high - low
-        };
-        let is_turning =
-            |joint: usize| fit.problem.joints[joint].command_kind() == JointKind::Revolute;
-        let is_narrow = |joint: usize| {
-            let reach = fit.fitting.model.reach();
-            range(joint) < if is_turning(joint) { MAX_ALIKE_TURN } else { MAX_ALIKE_TRAVEL * reach }
-        };
-        let mut joints: Vec<usize> = moving(fit).collect();
-        let widest = |turning: bool| {
-            let alike = joints.iter().filter(|joint| is_turning(**joint) == turning);
-            alike.map(|&joint| range(joint)).reduce(f64::max)
-        };
-        let turns =
-            widest(true).map(|most| format!("turns by more than {:.1}°", most.to_degrees()));
-        let slides = widest(false).map(|most| format!("slides by more than {:.1} mm", most * 1e3));
-        let least: Vec<String> = turns.into_iter().chain(slides).collect();
-        let measure =
-            "measure poses over the whole range of the joints (flexcal plan chooses them)";
-        if joints.iter().all(|&joint| is_narrow(joint)) && !joints.is_empty() {
-            let names: Vec<String> =
-                joints.iter().map(|&joint| column_name(table, joint)).collect();
-            let text = format!(
-                "the fitted poses are alike: no joint {}, so that parameters and predictions hold near \
-                 these poses only",
-                least.join(" or ")
-            );
-            let finding = Finding::new(FindingCode::NarrowPoses, [json!(names), true.into()], text);
-            return vec![finding.with_remedy(measure.to_owned())];
-        }
-        // A target on the axis of the last joint stays where it is.
-        if joints.last().is_some_and(|&joint| !moves_target(fit, &rows, joint)) {
-            joints.pop();
-        }
-        let still = still_joints(fit, &rows, &joints);
-        let Some(&first) = still.first() else { return Vec::new() };
-        let names: Vec<String> = still.iter().map(|&joint| column_name(table, joint)).collect();
-        let at = table.configuration(rows[0])[first];
-        let place = match still.len() {
-            1 if is_turning(first) => format!(" at {:.1}°", at.to_degrees()),
-            1 => format!(" at {:.1} mm", at * 1e3),
-            _ => " where they are".to_owned(),
-        };
-        let verb = if still.len() == 1 { "stays" } else { "stay" };
-        let text = format!(
-            "{} {verb}{place} in all fitted rows, so that the fit says little about predictions \
-             with other values",
-            names.join(", ")
-        );
-        vec![Finding::new(FindingCode::NarrowPoses, [json!(names), false.into()], text)]
+pub(super) fn poses_spread(fit: &CheckedFit) -> Option<Finding> {
+    let table = fit.fitting.measurements;
+    let is_of_arm = |row: &&usize| table.observation(**row).is_of_arm();
+    let rows: Vec<usize> =
+        fit.fitting.split.identification.iter().filter(is_of_arm).copied().collect();
+    // If the fit is far off, a joint that stands still is a column in doubt.
+    if rows.len() < MIN_ROWS || !misfit(fit).is_empty() {
+        return None;
     }
+    let range = |joint: usize| {
+        let values = rows.iter().map(|&row| table.configuration(row)[joint]);
+        let (low, high) = crate::numeric::range(values);
+        high - low
+    };
+    let is_turning = |joint: usize| fit.turns(joint);
+    let is_narrow = |joint: usize| {
+        let reach = fit.fitting.model.reach();
+        range(joint) < if is_turning(joint) { MAX_ALIKE_TURN } else { MAX_ALIKE_TRAVEL * reach }
+    };
+    let mut joints: Vec<usize> = moving(fit).collect();
+    let widest = |turning: bool| {
+        let alike = joints.iter().filter(|joint| is_turning(**joint) == turning);
+        alike.map(|&joint| range(joint)).reduce(f64::max)
+    };
+    let turns = widest(true).map(|most| format!("turns by more than {:.1}°", most.to_degrees()));
+    let slides = widest(false).map(|most| format!("slides by more than {:.1} mm", most * 1e3));
+    let least: Vec<String> = turns.into_iter().chain(slides).collect();
+    let measure = "measure poses over the whole range of the joints (flexcal plan chooses them)";
+    if joints.iter().all(|&joint| is_narrow(joint)) && !joints.is_empty() {
+        let names: Vec<String> = joints.iter().map(|&joint| column_name(table, joint)).collect();
+        let text = format!(
+            "the fitted poses are alike: no joint {}, so that parameters and predictions hold near \
+             these poses only",
+            least.join(" or ")
+        );
+        let finding = Finding::new(FindingCode::NarrowPoses, [json!(names), true.into()], text);
+        return Some(finding.with_remedy(measure));
+    }
+    // A target on the axis of the last joint stays where it is.
+    if joints.last().is_some_and(|&joint| !moves_target(fit, &rows, joint)) {
+        joints.pop();
+    }
+    let still = still_joints(fit, &rows, &joints);
+    let Some(&first) = still.first() else { return None };
+    let names: Vec<String> = still.iter().map(|&joint| column_name(table, joint)).collect();
+    let at = table.configuration(rows[0])[first];
+    let place = match still.len() {
+        1 if is_turning(first) => format!(" at {:.1}°", at.to_degrees()),
+        1 => format!(" at {:.1} mm", at * 1e3),
+        _ => " where they are".to_owned(),
+    };
+    let verb = if still.len() == 1 { "stays" } else { "stay" };
+    let text = format!(
+        "{} {verb}{place} in all fitted rows, so that the fit says little about predictions \
+         with other values",
+        names.join(", ")
+    );
+    Some(Finding::new(FindingCode::NarrowPoses, [json!(names), false.into()], text))
 }
 
 /// Returns true if the joint at index `joint` moves what one of the `rows` measures: a target that

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::held_out::mistake;
 use super::row_kind::{format_error, row_noun};
@@ -36,46 +36,40 @@ const MIN_ROWS: usize = 6;
 /// covariance C of its unknowns. Then χ² = rᵀ(Σ + J C Jᵀ)⁻¹ r has a χ² distribution. If Σ is
 /// estimated, χ² over the number of coordinates has an F distribution. Rows that are reported as
 /// outliers are left out.
-pub(super) struct PredictionHolds;
-
-impl Check for PredictionHolds {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let is_outlier =
-            |row: usize| fit.held_out_outliers.iter().any(|outlier| outlier.row == row);
-        let held_out = fit.fitting.split.held_out.iter().copied();
-        let rows: Vec<usize> = held_out.filter(|row| !is_outlier(*row)).collect();
-        let step = rows.len().div_ceil(MAX_TESTED_ROWS).max(1);
-        let rows: Vec<usize> = rows.into_iter().step_by(step).collect();
-        let Some((chi2, coordinates)) =
-            predictive_chi2(fit.fitting, &rows, &fit.end.x, &fit.whole.unknowns, fit.covariance)
-        else {
-            return Vec::new();
-        };
-        let dof = fit.whole.count() as f64 - fit.whole.unknowns.len() as f64;
-        let is_estimated = fit.noise != Noise::Declared || (fit.noise_factor - 1.0).abs() > 1e-9;
-        let Some((p_value, limit)) = upper_tail(chi2, coordinates, is_estimated.then_some(dof))
-        else {
-            return Vec::new();
-        };
-        if p_value >= MAX_CHANCE_PROBABILITY {
-            return Vec::new();
-        }
-        let text = format!(
-            "the held-out rows are {:.2} times as far from the prediction as the fit expects: χ² is {chi2:.0} for {coordinates} \
-             coordinates, expected below {limit:.0} (99.9 %)",
-            (chi2 / coordinates as f64).sqrt()
-        );
-        let numbers = [chi2.into(), coordinates.into(), p_value.into()];
-        let finding = Finding::new(FindingCode::HeldOutBeyondPrediction, numbers, text);
-        let leading = fit.kind(fit.fitting.measurements.leading());
-        let errors = fit.fitting.position_errors(&rows, &fit.end.x);
-        vec![match mistake(fit, &leading, (&rows, &errors)) {
-            Some(words) => {
-                finding.with_remedy(format!("{words}; correct these rows, or hold out others"))
-            }
-            None => finding,
-        }]
+pub(super) fn prediction_holds(fit: &CheckedFit) -> Option<Finding> {
+    let is_outlier = |row: usize| fit.held_out_outliers.iter().any(|outlier| outlier.row == row);
+    let held_out = fit.fitting.split.held_out.iter().copied();
+    let rows: Vec<usize> = held_out.filter(|row| !is_outlier(*row)).collect();
+    let step = rows.len().div_ceil(MAX_TESTED_ROWS).max(1);
+    let rows: Vec<usize> = rows.into_iter().step_by(step).collect();
+    let Some((chi2, coordinates)) =
+        predictive_chi2(fit.fitting, &rows, &fit.end.x, &fit.whole.unknowns, fit.covariance)
+    else {
+        return None;
+    };
+    let dof = fit.whole.count() as f64 - fit.whole.unknowns.len() as f64;
+    let is_estimated = fit.noise != Noise::Declared || (fit.noise_factor - 1.0).abs() > 1e-9;
+    let Some((p_value, limit)) = upper_tail(chi2, coordinates, is_estimated.then_some(dof)) else {
+        return None;
+    };
+    if p_value >= MAX_CHANCE_PROBABILITY {
+        return None;
     }
+    let text = format!(
+        "the held-out rows are {:.2} times as far from the prediction as the fit expects: χ² is {chi2:.0} for {coordinates} \
+         coordinates, expected below {limit:.0} (99.9 %)",
+        (chi2 / coordinates as f64).sqrt()
+    );
+    let numbers = [chi2.into(), coordinates.into(), p_value.into()];
+    let finding = Finding::new(FindingCode::HeldOutBeyondPrediction, numbers, text);
+    let leading = fit.leading();
+    let errors = fit.fitting.position_errors(&rows, &fit.end.x);
+    Some(
+        finding.with_remedy_of(
+            mistake(fit, &leading, (&rows, &errors))
+                .map(|words| format!("{words}; correct these rows, or hold out others")),
+        ),
+    )
 }
 
 /// Returns the probability that χ² of residuals as large as predicted exceeds `chi2`, and the χ²
@@ -144,61 +138,53 @@ fn predictive_chi2(
 
 /// Checks that pixels that were not fitted are missed by about as much as fitted ones, even where the
 /// covariance of the fit allows more.
-pub(super) struct PredictionIsSure;
-
-impl Check for PredictionIsSure {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let [fitted, held_out] = [&fit.fitted.identification, &fit.fitted.held_out];
-        let ratio = held_out.rms.norm / fitted.rms.norm;
-        let is_of_images = fitted.kind == Observation::Pixel(0, 0, 0).kind();
-        let exceeds_noise = held_out.rms.norm > UNCERTAIN_RATIO * fit.sigma_taken;
-        if !(is_of_images && exceeds_noise && ratio.is_finite() && ratio > UNCERTAIN_RATIO) {
-            return Vec::new();
-        }
-        let text = format!("held-out rows miss by {ratio:.0} times as much as fitted ones");
-        vec![Finding::new(FindingCode::HeldOutUncertain, [fitted.kind.into(), ratio.into()], text)]
+pub(super) fn prediction_is_sure(fit: &CheckedFit) -> Option<Finding> {
+    let [fitted, held_out] = [&fit.fitted.identification, &fit.fitted.held_out];
+    let ratio = held_out.rms.norm / fitted.rms.norm;
+    let is_of_images = fitted.kind == Observation::Pixel(0, 0, 0).kind();
+    let exceeds_noise = held_out.rms.norm > UNCERTAIN_RATIO * fit.sigma_taken;
+    if !(is_of_images && exceeds_noise && ratio.is_finite() && ratio > UNCERTAIN_RATIO) {
+        return None;
     }
+    let text = format!("held-out rows miss by {ratio:.0} times as much as fitted ones");
+    Some(Finding::new(FindingCode::HeldOutUncertain, [fitted.kind.into(), ratio.into()], text))
 }
 
 /// Checks that the squared held-out errors of the fitted arm are not significantly larger, in the
 /// mean, than those of the registered nominal arm.
-pub(super) struct NotWorseThanNominal;
-
-impl Check for NotWorseThanNominal {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let fitting = fit.fitting;
-        let kind = fit.fitted.held_out.kind;
-        let of_kind = |row: &usize| fitting.measurements.observation(*row).kind() == kind;
-        let rows: Vec<usize> = fitting.split.held_out.iter().copied().filter(of_kind).collect();
-        let errors = |x| fitting.position_errors(&rows, x);
-        let pairs = errors(fit.registered_x).into_iter().zip(errors(&fit.end.x));
-        let differences: Vec<f64> = pairs
-            .map(|(before, after)| after.norm_squared() - before.norm_squared())
-            .filter(|difference| difference.is_finite())
-            .collect();
-        let count = differences.len() as f64;
-        if differences.len() < MIN_ROWS {
-            return Vec::new();
-        }
-        let mean = differences.iter().sum::<f64>() / count;
-        let squares: f64 = differences.iter().map(|difference| (difference - mean).powi(2)).sum();
-        let error = (squares / (count - 1.0) / count).sqrt();
-        if mean <= MIN_DIFFERENCE * error {
-            return Vec::new();
-        }
-        let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
-        // Differences of rounding may all have one sign and are then beyond chance.
-        if after <= MIN_WORSENING * before {
-            return Vec::new();
-        }
-        let text = format!(
-            "the fit made the error of held-out {} worse ({} rms with the nominal arm, {} \
-             fitted), beyond chance",
-            row_noun(kind),
-            format_error(kind, before, 3),
-            format_error(kind, after, 3)
-        );
-        let numbers = [kind.into(), before.into(), after.into()];
-        vec![Finding::new(FindingCode::HeldOutNotBetter, numbers, text)]
+pub(super) fn not_worse_than_nominal(fit: &CheckedFit) -> Option<Finding> {
+    let fitting = fit.fitting;
+    let kind = fit.fitted.held_out.kind;
+    let of_kind = |row: &usize| fitting.measurements.observation(*row).kind() == kind;
+    let rows: Vec<usize> = fitting.split.held_out.iter().copied().filter(of_kind).collect();
+    let errors = |x| fitting.position_errors(&rows, x);
+    let pairs = errors(fit.registered_x).into_iter().zip(errors(&fit.end.x));
+    let differences: Vec<f64> = pairs
+        .map(|(before, after)| after.norm_squared() - before.norm_squared())
+        .filter(|difference| difference.is_finite())
+        .collect();
+    let count = differences.len() as f64;
+    if differences.len() < MIN_ROWS {
+        return None;
     }
+    let mean = differences.iter().sum::<f64>() / count;
+    let squares: f64 = differences.iter().map(|difference| (difference - mean).powi(2)).sum();
+    let error = (squares / (count - 1.0) / count).sqrt();
+    if mean <= MIN_DIFFERENCE * error {
+        return None;
+    }
+    let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
+    // Differences of rounding may all have one sign and are then beyond chance.
+    if after <= MIN_WORSENING * before {
+        return None;
+    }
+    let text = format!(
+        "the fit made the error of held-out {} worse ({} rms with the nominal arm, {} \
+         fitted), beyond chance",
+        row_noun(kind),
+        format_error(kind, before, 3),
+        format_error(kind, after, 3)
+    );
+    let numbers = [kind.into(), before.into(), after.into()];
+    Some(Finding::new(FindingCode::HeldOutNotBetter, numbers, text))
 }

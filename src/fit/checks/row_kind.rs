@@ -43,6 +43,17 @@ pub(super) fn spread(
     (squares / rows.len().max(1) as f64).sqrt()
 }
 
+/// Names of the coordinates of a position.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Joins the first `max` words by commas and states how many others there are: "a, b and 3 more".
+pub(super) fn listed(words: &[impl AsRef<str>], max: usize) -> String {
+    let shown: Vec<&str> = words.iter().take(max).map(AsRef::as_ref).collect();
+    let more = words.len().saturating_sub(max);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more}", shown.join(", "))
+}
+
 /// Smallest length that [`format_error`] writes with a power of ten \[m\].
 const MIN_SCIENTIFIC_LENGTH: f64 = 1e6;
 

@@ -9,7 +9,6 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rand::seq::SliceRandom as _;
 
 use super::checked_fit::CheckedFit;
-use crate::problem::JointKind;
 use crate::random;
 
 /// Maximum number of rows, evenly spaced, whose pairs are regressed.
@@ -59,7 +58,7 @@ pub(super) fn other_rows(fit: &CheckedFit, joints: &[usize]) -> Option<OtherRows
     let nominal = fit.fitting.located();
     let predicted = fit.fitting.model.predicted_targets(&poses, nominal.as_slice());
     let measured: Vec<Vector3<f64>> = rows.iter().map(|&row| measurements.positions[row]).collect();
-    let is_turning = |joint: usize| fit.problem.joints[joint].command_kind() == JointKind::Revolute;
+    let is_turning = |joint: usize| fit.turns(joint);
     // Distances between rows of different bases depend on where these stand.
     let places = (0..rows.len()).flat_map(|one| (0..one).map(move |other| [one, other]));
     let pairs = Pairs {

@@ -9,7 +9,7 @@ use serde_json::json;
 use statrs::distribution::{ContinuousCDF as _, Normal};
 use statrs::function::factorial::ln_binomial;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::outliers::Outlier;
 use crate::least_squares::Loss;
@@ -132,26 +132,22 @@ fn upper_tail(z: f64) -> f64 {
 
 /// Checks that the rows which a robust loss treats as outliers are a random selection, which does
 /// not depend on time, session, a joint or a load.
-pub(super) struct SetAsideByChance;
-
-impl Check for SetAsideByChance {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let rows = &fit.fitting.split.identification;
-        if fit.fitting.loss == Loss::Squares {
-            return Vec::new();
-        }
-        let found = selection(fit.fitting.measurements, rows, fit.outliers);
-        let finding = |Selection { quantity, p_value }: Selection| {
-            let (count, of) = (fit.outliers.len(), rows.len());
-            let text = format!(
-                "the robust loss sets {count} of {of} rows aside, and {quantity} decides which: a \
-                 cause acts in them"
-            );
-            let numbers = [count.into(), of.into(), json!(quantity), p_value.into()];
-            Finding::new(FindingCode::RowsSetAside, numbers, text)
-        };
-        found.map(finding).into_iter().collect()
+pub(super) fn set_aside_by_chance(fit: &CheckedFit) -> Option<Finding> {
+    let rows = &fit.fitting.split.identification;
+    if fit.fitting.loss == Loss::Squares {
+        return None;
     }
+    let found = selection(fit.fitting.measurements, rows, fit.outliers);
+    let finding = |Selection { quantity, p_value }: Selection| {
+        let (count, of) = (fit.outliers.len(), rows.len());
+        let text = format!(
+            "the robust loss sets {count} of {of} rows aside, and {quantity} decides which: a \
+             cause acts in them"
+        );
+        let numbers = [count.into(), of.into(), json!(quantity), p_value.into()];
+        Finding::new(FindingCode::RowsSetAside, numbers, text)
+    };
+    found.map(finding)
 }
 
 #[cfg(test)]

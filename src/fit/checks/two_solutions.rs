@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use rand::RngExt as _;
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use crate::fit::uncertainty::second_solution::{SecondSolution, distance};
 use crate::model::Pose;
@@ -24,12 +24,8 @@ const MIN_APART: f64 = 5.0;
 const MOST_DECIMALS: usize = 6;
 
 /// Checks that the measurements exclude every other arm that is found.
-pub(super) struct OneSolution;
-
-impl Check for OneSolution {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        fit.second.and_then(|second| two_solutions_finding(fit, second)).into_iter().collect()
-    }
+pub(super) fn one_solution(fit: &CheckedFit) -> Option<Finding> {
+    fit.second.and_then(|second| two_solutions_finding(fit, second))
 }
 
 /// Reports the parameter in which the arms differ most, in standard errors, and the configuration

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use serde_json::json;
 
-use super::checked_fit::{Check, CheckedFit};
+use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use crate::measurement::Measurements;
 use crate::model::Pose;
@@ -47,65 +47,59 @@ pub(super) fn views(measurements: &Measurements, rows: &[usize]) -> Vec<Vec<usiz
 /// A board looks the same after half a turn, so that a detector may begin at either end. Reversed
 /// points of one view fit some pose of the marker as well as points in the right order, but not the
 /// pose that the arm predicts.
-pub(super) struct PointsInOrder;
-
-impl Check for PointsInOrder {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let (fitting, problem) = (fit.fitting, fit.problem);
-        let split = fitting.split;
-        let rows: Vec<usize> =
-            split.identification.iter().chain(&split.held_out).copied().collect();
-        let poses = fitting.poses(&rows);
-        let reversed: Vec<Pose> = poses
-            .iter()
-            .map(|pose| Pose { observation: reversed(problem, pose.observation), ..*pose })
-            .collect();
-        if poses.iter().zip(&reversed).all(|(pose, other)| pose.observation == other.observation) {
-            return Vec::new();
-        }
-        let views = views(fitting.measurements, &rows);
-        // Reversed views may spoil the fit. The views are therefore judged by the fitted or the
-        // registered nominal arm, whichever has the smaller error.
-        let errors = |poses: &[Pose], x| fitting.model.residuals(poses.to_vec(), x);
-        let all_places: Vec<usize> = (0..rows.len()).collect();
-        let arms = [fit.registered_x, &fit.end.x].map(|x| (errors(&poses, x), x));
-        let [nominal, fitted] = arms;
-        let is_fitted = mean_square(&fitted.0, &all_places) < mean_square(&nominal.0, &all_places);
-        let (errors_here, x) = if is_fitted { fitted } else { nominal };
-        let errors_reversed = errors(&reversed, x);
-        let squares = |view: &[usize]| {
-            [&errors_here, &errors_reversed].map(|errors| mean_square(errors, view))
-        };
-        let is_reversed = |view: &&Vec<usize>| {
-            let [square, other] = squares(view);
-            view.len() >= MIN_POINTS && other < MAX_REVERSED_RATIO.powi(2) * square
-        };
-        let found: Vec<&Vec<usize>> = views.iter().filter(is_reversed).collect();
-        let places: Vec<usize> = found.iter().copied().flatten().copied().collect();
-        let [before, after] = squares(&places).map(f64::sqrt);
-        // If most views were reversed, the error would be of the arm or the marker.
-        if found.is_empty() || 2 * found.len() > views.len() {
-            return Vec::new();
-        }
-        let mut first: Vec<usize> =
-            found.iter().filter_map(|view| view.iter().map(|&place| rows[place]).min()).collect();
-        first.sort_unstable();
-        let listed = first.iter().take(MAX_LISTED);
-        let listed: Vec<String> =
-            listed.map(|&row| fitting.measurements.location(row).to_string()).collect();
-        let more = if first.len() > MAX_LISTED { ", …" } else { "" };
-        let (views, begin) = match first.len() {
-            1 => ("1 view numbers".to_owned(), "it begins"),
-            count => (format!("{count} views number"), "they begin"),
-        };
-        let text = format!(
-            "{views} the points of the marker from the other end: {begin} at {}{more}; with the \
-             reverse order the error falls from {before:.1} to {after:.1} px",
-            listed.join(", ")
-        );
-        let numbers = [json!(first.len()), json!(before), json!(after)];
-        vec![Finding::new(FindingCode::ViewsReversed, numbers, text)]
+pub(super) fn points_in_order(fit: &CheckedFit) -> Option<Finding> {
+    let (fitting, problem) = (fit.fitting, fit.problem);
+    let split = fitting.split;
+    let rows: Vec<usize> = split.identification.iter().chain(&split.held_out).copied().collect();
+    let poses = fitting.poses(&rows);
+    let reversed: Vec<Pose> = poses
+        .iter()
+        .map(|pose| Pose { observation: reversed(problem, pose.observation), ..*pose })
+        .collect();
+    if poses.iter().zip(&reversed).all(|(pose, other)| pose.observation == other.observation) {
+        return None;
     }
+    let views = views(fitting.measurements, &rows);
+    // Reversed views may spoil the fit. The views are therefore judged by the fitted or the
+    // registered nominal arm, whichever has the smaller error.
+    let errors = |poses: &[Pose], x| fitting.model.residuals(poses.to_vec(), x);
+    let all_places: Vec<usize> = (0..rows.len()).collect();
+    let arms = [fit.registered_x, &fit.end.x].map(|x| (errors(&poses, x), x));
+    let [nominal, fitted] = arms;
+    let is_fitted = mean_square(&fitted.0, &all_places) < mean_square(&nominal.0, &all_places);
+    let (errors_here, x) = if is_fitted { fitted } else { nominal };
+    let errors_reversed = errors(&reversed, x);
+    let squares =
+        |view: &[usize]| [&errors_here, &errors_reversed].map(|errors| mean_square(errors, view));
+    let is_reversed = |view: &&Vec<usize>| {
+        let [square, other] = squares(view);
+        view.len() >= MIN_POINTS && other < MAX_REVERSED_RATIO.powi(2) * square
+    };
+    let found: Vec<&Vec<usize>> = views.iter().filter(is_reversed).collect();
+    let places: Vec<usize> = found.iter().copied().flatten().copied().collect();
+    let [before, after] = squares(&places).map(f64::sqrt);
+    // If most views were reversed, the error would be of the arm or the marker.
+    if found.is_empty() || 2 * found.len() > views.len() {
+        return None;
+    }
+    let mut first: Vec<usize> =
+        found.iter().filter_map(|view| view.iter().map(|&place| rows[place]).min()).collect();
+    first.sort_unstable();
+    let listed = first.iter().take(MAX_LISTED);
+    let listed: Vec<String> =
+        listed.map(|&row| fitting.measurements.location(row).to_string()).collect();
+    let more = if first.len() > MAX_LISTED { ", …" } else { "" };
+    let (views, begin) = match first.len() {
+        1 => ("1 view numbers".to_owned(), "it begins"),
+        count => (format!("{count} views number"), "they begin"),
+    };
+    let text = format!(
+        "{views} the points of the marker from the other end: {begin} at {}{more}; with the \
+         reverse order the error falls from {before:.1} to {after:.1} px",
+        listed.join(", ")
+    );
+    let numbers = [json!(first.len()), json!(before), json!(after)];
+    Some(Finding::new(FindingCode::ViewsReversed, numbers, text))
 }
 
 /// Returns the observation of the point that has the same number as the observed one if the marker

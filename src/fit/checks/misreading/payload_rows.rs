@@ -11,6 +11,7 @@ use super::explanation::Explanation;
 use super::search::Trial;
 use super::{MassScale, Misreading};
 use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::row_kind::listed;
 use crate::fit::stages::fitting::Fitting;
 use crate::least_squares::{LinearisationCache, jacobian_and_residual};
 use crate::measurement::Measurements;
@@ -382,12 +383,10 @@ impl Rows<'_> {
                 place(last)
             )
         } else {
-            let listed = changed.iter().take(MAX_LISTED);
-            let listed = listed.map(|&k| format!("{} kg in {}", shown(payloads[k]), place(k)));
-            let listed: Vec<String> = listed.collect();
-            let more = changed.len().saturating_sub(listed.len());
-            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            format!("other payloads in some rows: {}{more}", listed.join(", "))
+            let words =
+                changed.iter().map(|&k| format!("{} kg in {}", shown(payloads[k]), place(k)));
+            let words: Vec<String> = words.collect();
+            format!("other payloads in some rows: {}", listed(&words, MAX_LISTED))
         };
         Some(Mistake { words, payloads })
     }

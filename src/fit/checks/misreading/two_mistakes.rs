@@ -4,6 +4,7 @@ use super::Misreading;
 use super::explanation::Explanation;
 use super::search::{MAX_EXPLAINED_RATIO, TRIAL_TOLERANCE, Trial, near_misreadings};
 use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::row_kind::listed;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::Split;
 use crate::numeric::{median, parallel};
@@ -118,11 +119,10 @@ impl Trial<'_> {
         let leaves_rows_out = |misreading: &Misreading| {
             matches!(misreading, Misreading::Shifted { .. } | Misreading::TextOrder { .. })
         };
-        let listed = errors.iter().map(|(misreading, _)| *misreading);
-        let listed = listed.filter(|misreading| !leaves_rows_out(misreading)).take(MAX_TRIMMED);
-        let trimmed = parallel::map_items(&listed.collect::<Vec<_>>(), |&misreading| {
-            self.trimmed(misreading)
-        });
+        let tried = errors.iter().map(|(misreading, _)| *misreading);
+        let tried = tried.filter(|misreading| !leaves_rows_out(misreading)).take(MAX_TRIMMED);
+        let trimmed =
+            parallel::map_items(&tried.collect::<Vec<_>>(), |&misreading| self.trimmed(misreading));
         let mut trimmed: Vec<Trimmed> = trimmed.into_iter().flatten().collect();
         trimmed.sort_by(|a, b| a.error.total_cmp(&b.error));
         let ranked: Vec<(Misreading, f64)> =
@@ -139,16 +139,13 @@ impl Trial<'_> {
         let explained = without.explained(&near, MAX_EXPLAINED_RATIO * as_read);
         let best = explained.into_iter().next()?;
         let table = self.fitting.measurements;
-        let listed = wrong.iter().take(MAX_LISTED);
-        let listed = listed.map(|&place| table.location(self.chosen[place]).to_string());
-        let listed: Vec<String> = listed.collect();
-        let more = wrong.len() - listed.len();
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let places: Vec<String> =
+            wrong.iter().map(|&place| table.location(self.chosen[place]).to_string()).collect();
         let (noun, verb) = if wrong.len() == 1 { ("row", "is") } else { ("rows", "are") };
         let words = format!(
-            "{}, and without the {noun} {}{more}, which {verb} wrong besides",
+            "{}, and without the {noun} {}, which {verb} wrong besides",
             best.words,
-            listed.join(", ")
+            listed(&places, MAX_LISTED)
         );
         Some(Explanation { words, ..best })
     }

@@ -8,7 +8,7 @@ use super::commands::MILLIRADIANS;
 use super::images::name_of_fixture;
 use super::two_entries::entry_name;
 use super::{MassScale, Misreading, POSITION_UNITS, numbers_of, power_of_ten};
-use crate::error::Location;
+use crate::fit::checks::row_kind::AXES;
 use crate::fit::stages::single_views::Numbering;
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
@@ -75,7 +75,7 @@ impl Misreading {
             (Self::CentreSign { mass, axis }, _) => {
                 let mut bodies = problem.joints.iter().flat_map(|joint| &joint.bodies);
                 let name = bodies.nth(mass - 1).map_or("", |body| body.name.as_str());
-                let axis = ['x', 'y', 'z'][axis];
+                let axis = AXES[axis];
                 format!("{axis} of the centre of mass of {name} that has the other sign")
             }
             (Self::Mass { mass, scale }, _) => match name_of_mass(problem, mass) {
@@ -142,7 +142,7 @@ impl Misreading {
             _ => return None,
         };
         let location = &problem.joints.get(row.checked_sub(1)?)?.location;
-        let place = Location { key: None, excerpt: None, ..location.clone() };
+        let place = location.of_line();
         Some(if is_standard {
             format!("row {row} of the table, {place}")
         } else {
@@ -246,7 +246,7 @@ impl fmt::Display for Misreading {
                 f.write_str("two of x, y and z that are exchanged, or one of the other sign")
             }
             Self::Mirrored { axes: Some([first, second]) } => {
-                let [one, other] = [first, second].map(|axis| ['x', 'y', 'z'][axis]);
+                let [one, other] = [first, second].map(|axis| AXES[axis]);
                 if first == second {
                     write!(f, "{one} of the positions that has the other sign")
                 } else {
@@ -268,18 +268,18 @@ impl fmt::Display for Misreading {
                     -2 => ("centimetres", "metres"),
                     _ => ("millimetres", "metres"),
                 };
-                let name = ['x', 'y', 'z'][axis];
+                let name = AXES[axis];
                 write!(f, "{name} alone that is in {found}, declared in {declared}")
             }
             Self::AxisScale { axis, millionths } => {
-                let (name, ratio) = (['x', 'y', 'z'][axis], f64::from(millionths) * 1e-6);
+                let (name, ratio) = (AXES[axis], f64::from(millionths) * 1e-6);
                 write!(
                     f,
                     "{name} of the positions that is {ratio:.4} times as large as it should be"
                 )
             }
             Self::AxisInches { axis } => {
-                let name = ['x', 'y', 'z'][axis];
+                let name = AXES[axis];
                 write!(f, "{name} alone that is in inches, declared in millimetres")
             }
             Self::Shifted { by, from } => {
@@ -416,15 +416,11 @@ impl Misreading {
             Self::CentreSign { mass, axis } => write!(
                 f,
                 "{} of the centre of mass {mass}, counted along the arm, that has the other sign",
-                ['x', 'y', 'z'][axis]
+                AXES[axis]
             ),
             Self::Gravity { axis, is_negative } => {
                 let sign = if is_negative { "−" } else { "+" };
-                write!(
-                    f,
-                    "gravity that points along {sign}{} (gravity_m_s2)",
-                    ['x', 'y', 'z'][axis]
-                )
+                write!(f, "gravity that points along {sign}{} (gravity_m_s2)", AXES[axis])
             }
             Self::HeldTarget => f.write_str(
                 "a target that lies elsewhere than [tool] declares (correct it there, or free it \
