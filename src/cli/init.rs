@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::error::{InputError, Location};
+use flexcal::error::InputError;
 use flexcal::problem::Problem;
 use flexcal::report;
 use flexcal::results::{Document as _, InitResult};
@@ -94,22 +94,24 @@ fn complete_sheet(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             "--base, --tip, --board and --tag belong to a URDF, not to a table of joints".into()
         );
     }
+    let flags = &arguments.flags;
     let (problem, text) = if has_ending(&arguments.urdf, &["toml"]) {
         Problem::read_with_text(&arguments.urdf)?
     } else {
-        let text = text_of_table(&arguments.urdf)?;
-        // Lines are those of the text that was made, not of the table.
-        let without_line = |error: InputError| {
-            let Location { file, key, .. } = *error.location;
-            InputError {
-                location: Box::new(Location { file, line: None, key, excerpt: None }),
-                ..error
-            }
+        let sheet = text_of_table(&arguments.urdf)?;
+        flags.warn(&sheet.warnings);
+        let in_table = |error: InputError| InputError {
+            location: Box::new(sheet.place(*error.location)),
+            ..error
         };
-        (Problem::parse(&text, &arguments.urdf).map_err(without_line)?, text.into())
+        let mut problem = Problem::parse(&sheet.text, &arguments.urdf).map_err(in_table)?;
+        for warning in &mut problem.warnings {
+            warning.location = sheet.place(std::mem::take(&mut warning.location));
+        }
+        (problem, sheet.text.into())
     };
+    flags.warn(&problem.warnings);
     let description = complete(&problem, &text)?;
-    let flags = &arguments.flags;
     let results =
         flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
     results.write(&[("problem.toml", &description.text)])?;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::NoRows;
-use super::near::{is_it_rather, key_suggestion, pattern_suggestion, suggestion};
+use super::near::{is_it_rather, key_suggestion, name_suggestion, pattern_suggestion, suggestion};
 use super::phrases::{
     behind_camera_remedy, decimal_comma_hint, joined_list, missed, near_quote, path_hint, plural,
     renumbered, stiffness_units, with_remedy,
@@ -394,7 +394,7 @@ pub enum InputErrorKind {
     UnreachableLimit { reach: f64 },
     #[error(
         "no such parameter{}; {}",
-        suggestion(name, known),
+        name_suggestion(name, known),
         joined_list("there are", known, "the arm has none")
     )]
     UnknownParameter { name: String, known: Vec<String> },

@@ -98,7 +98,30 @@ pub(super) fn pattern_suggestion(pattern: &str, known: &[String]) -> String {
     {
         return format!(" ({joint} declares no stiffness_N_m_per_rad: write it in its [[joint]])");
     }
-    suggestion(pattern, known)
+    if let Some(rest) = pattern.strip_prefix("joint0") {
+        return format!(" (joints are counted from 1: \"joint1{rest}\" is the first)");
+    }
+    let brackets = pattern.split_once('[').zip(pattern.split_once(']'));
+    if let Some(((head, _), (_, rest))) = brackets
+        && known.iter().any(|name| name.strip_prefix(head).is_some_and(|end| end.starts_with('.')))
+    {
+        return format!(" (nothing here has a name in brackets: \"{head}{rest}\")");
+    }
+    match pattern.strip_suffix(".*") {
+        Some(head) => {
+            let heads = known.iter().filter_map(|name| Some(name.rsplit_once('.')?.0));
+            did_you_mean(nearest(head, heads).map(|head| format!("\"{head}.*\"")).as_deref())
+        }
+        None => suggestion(pattern, known),
+    }
+}
+
+/// Returns the suggestion for a name that is no parameter, where no patterns are taken.
+pub(super) fn name_suggestion(name: &str, known: &[String]) -> String {
+    if name.contains('*') {
+        return " (no patterns here: write each name in full)".to_owned();
+    }
+    suggestion(name, known)
 }
 
 /// Returns ` (is it …?)` with a similar word and its noun; an empty text for `None`.

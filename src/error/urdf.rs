@@ -13,6 +13,12 @@ pub enum UrdfErrorKind {
     Missing,
     #[error("the column has no unit; write {write} in the header")]
     SheetUnit { write: String },
+    #[error(
+        "{found} is no unit of this column; write {write} in the header, and convert the numbers"
+    )]
+    SheetOtherUnit { found: String, write: String },
+    #[error("another column states {key} in this row, too; keep one of the two")]
+    SheetTwice { key: &'static str },
     #[error("\"{cell}\" is not a number, nor a coordinate with its constant part such as q2 - 90")]
     SheetCell { cell: String },
     #[error(

@@ -263,8 +263,14 @@ pub enum WarningKind {
          and max_rad instead of min_deg and max_deg"
     )]
     LimitsLookLikeRadians { widest: String },
-    #[error("a limit of {turns} turns; if it is in degrees, write {write}")]
-    LimitLooksLikeDegrees { turns: String, write: String },
+    #[error("{what} of {turns} turns; if it is in degrees, write {write}")]
+    AngleLooksLikeDegrees { what: &'static str, turns: String, write: String },
+    #[error(
+        "columns not taken: {}; taken: {}. A column is known by a name such as theta_deg, d_mm, \
+         a_mm, alpha_deg, min_deg, max_deg",
+        names.join(", "), taken.join(", ")
+    )]
+    SheetColumns { names: Vec<String>, taken: Vec<String> },
     #[error(
         "a focal length of {focal} px is short for an image that is {width} px wide; if it is in \
          millimetres, divide it by the size of a pixel in millimetres"

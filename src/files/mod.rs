@@ -3,6 +3,7 @@
 
 mod batch;
 mod format;
+mod latin;
 mod lock;
 mod record;
 mod regular;
@@ -16,6 +17,7 @@ use std::path::Path;
 pub use batch::Batch;
 pub use format::{FORMAT_VERSION, PROGRAM};
 pub(crate) use format::{Format, newer_version};
+pub(crate) use latin::windows_1252;
 pub use lock::{FolderLock, MAX_LOCK_WAIT};
 pub use record::{FolderRecord, digest, was_changed};
 pub use sealed::Changes;

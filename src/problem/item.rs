@@ -12,7 +12,7 @@ use toml::de::{DeInteger, DeString, DeTable, DeValue};
 use crate::error::{
     BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, binary_format, is_hidden, lines,
 };
-use crate::files::read_limited;
+use crate::files::{read_limited, windows_1252};
 use crate::quantity::Unit;
 
 /// Maximum size of a TOML file that is read \[MiB\].
@@ -29,6 +29,31 @@ pub(crate) struct Document {
 impl Document {
     /// Reads a text file; `missing` is the error that is returned if the file does not exist.
     pub fn read(file: &Path, missing: InputErrorKind) -> Result<Self, InputError> {
+        let text = Self::read_bytes(file, missing)?;
+        let text = String::from_utf8(text).map_err(|error| not_utf8(file, error.as_bytes()))?;
+        Ok(Self { file: file.to_owned(), text: Arc::from(text) })
+    }
+
+    /// Does the same as [`read`](Self::read) for a file that may also be in Windows-1252. Returns
+    /// the line too from which on it is, if it is.
+    pub fn read_table(
+        file: &Path,
+        missing: InputErrorKind,
+    ) -> Result<(Self, Option<usize>), InputError> {
+        let bytes = Self::read_bytes(file, missing)?;
+        let (text, line) = match String::from_utf8(bytes) {
+            Ok(text) => (text, None),
+            Err(error) => {
+                let refused = not_utf8(file, error.as_bytes());
+                let line = refused.location.line;
+                (windows_1252(error.as_bytes()).ok_or(refused)?, line)
+            }
+        };
+        Ok((Self { file: file.to_owned(), text: Arc::from(text) }, line))
+    }
+
+    /// Reads a file that is expected to be text, as bytes.
+    fn read_bytes(file: &Path, missing: InputErrorKind) -> Result<Vec<u8>, InputError> {
         let expected = missing.expected_file();
         let bytes = read_limited(file, MAX_TEXT_MIB << 20).map_err(|source| {
             Location::file(file).error(match source.kind() {
@@ -43,26 +68,25 @@ impl Document {
         if let Some(found) = binary_format(&bytes) {
             return Err(Location::file(file).error(InputErrorKind::OtherFormat { found, expected }));
         }
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let valid =
-                error.as_bytes().get(..error.utf8_error().valid_up_to()).unwrap_or_default();
-            Location::file(file).at_line(lines(valid)).error(InputErrorKind::NotUtf8)
-        })?;
-        Ok(Self { file: file.to_owned(), text: Arc::from(text) })
+        Ok(bytes)
     }
 
     /// Parses the text as TOML.
     pub fn table(&self) -> Result<Spanned<DeTable<'_>>, InputError> {
-        DeTable::parse(&self.text).map_err(|error| {
-            let span = error.span().unwrap_or(self.text.len()..self.text.len());
-            self.locate(span).error(self.syntax_error(&error))
-        })
+        DeTable::parse(&self.text).map_err(|error| self.syntax_error(&error))
     }
 
     /// Returns the place of a span of the text.
     pub fn locate(&self, span: Range<usize>) -> Location {
         Location::in_text(&self.file, &self.text, span)
     }
+}
+
+/// Returns the error of a file that is not UTF-8, with the first line that is not.
+fn not_utf8(file: &Path, bytes: &[u8]) -> InputError {
+    let valid = std::str::from_utf8(bytes).map_or_else(|error| error.valid_up_to(), str::len);
+    let line = lines(bytes.get(..valid).unwrap_or_default());
+    Location::file(file).at_line(line).error(InputErrorKind::NotUtf8)
 }
 
 /// Value of the problem file with its key and place.

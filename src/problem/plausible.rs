@@ -17,6 +17,8 @@ const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 const MAX_LIMIT_RADIANS: f64 = TAU + 0.02;
 /// Largest plausible limit of a joint in radians \[turns\].
 const MAX_LIMIT_TURNS: f64 = 6.0;
+/// Largest plausible angle of the joint table in radians \[turns\]: one, with a margin for rounding.
+const MAX_ANGLE_TURNS: f64 = 1.01;
 /// Largest plausible distance of a fixture from the origin of the measuring frame, or between two
 /// points, as a multiple of the length of the arm's links.
 const MAX_FIXTURE_LINKS: f64 = 20.0;
@@ -50,13 +52,19 @@ pub(super) fn joint_warnings(section: &Section<'_, '_>) -> Vec<Warning> {
             warnings.push(Warning { location: item.location(), kind });
         }
     }
-    for key in ["min_rad", "max_rad"] {
-        let Some(item) = section.peek(key) else { continue };
-        let turns = item.number().map_or(0.0, |limit| limit.abs() / TAU);
-        if turns > MAX_LIMIT_TURNS && turns.is_finite() {
-            let write = key.replace("_rad", "_deg");
-            let kind = WarningKind::LimitLooksLikeDegrees { turns: number(turns, 0), write };
-            warnings.push(Warning { location: item.location(), kind });
+    let angles = [
+        ("a limit", ["min_rad", "max_rad"].as_slice(), MAX_LIMIT_TURNS),
+        ("an angle", &["alpha_rad", "theta_rad", "beta_rad"], MAX_ANGLE_TURNS),
+    ];
+    for (what, keys, most) in angles {
+        for item in keys.iter().filter_map(|key| section.peek(key)) {
+            let turns = item.number().map_or(0.0, |angle| angle.abs() / TAU);
+            if turns > most && turns.is_finite() {
+                let write = item.key.rsplit('.').next().unwrap_or_default().replace("_rad", "_deg");
+                let kind =
+                    WarningKind::AngleLooksLikeDegrees { what, turns: two_digits(turns, 1), write };
+                warnings.push(Warning { location: item.location(), kind });
+            }
         }
     }
     for key in ["a_m", "d_m"] {

@@ -2,7 +2,7 @@
 
 use super::item::Document;
 use super::wrong_type::number_and_unit;
-use crate::error::{InputErrorKind, JSON, TABLE, TOML, XML, text_format, typographic};
+use crate::error::{InputError, InputErrorKind, JSON, TABLE, TOML, XML, text_format, typographic};
 
 /// Words that stand for true, false or nothing in other formats and languages.
 const OTHER_WORDS: [&str; 12] =
@@ -15,7 +15,7 @@ const LISTS: [&str; 9] =
 impl Document {
     /// Returns the error of a syntax `error` of the parser, which names the usual mistake if one is
     /// recognised, or the format of the file if that is another one.
-    pub(super) fn syntax_error(&self, error: &toml::de::Error) -> InputErrorKind {
+    pub(super) fn syntax_error(&self, error: &toml::de::Error) -> InputError {
         let span = error.span().unwrap_or(self.text.len()..self.text.len());
         let (before, after) = (
             self.text.get(..span.start).unwrap_or_default(),
@@ -28,11 +28,22 @@ impl Document {
         if previous_lines.lines().all(has_no_content)
             && let Some(found) = text_format(&self.text).filter(|format| *format != TOML)
         {
-            return InputErrorKind::OtherFormat { found, expected: expected_instead_of(found) };
+            let expected = expected_instead_of(found);
+            return self.locate(span).error(InputErrorKind::OtherFormat { found, expected });
+        }
+        let line_after = after.lines().next().unwrap_or_default();
+        if let Some((place, message, remedy)) =
+            not_closed(previous_lines, (before_in_line, line_after), error.message())
+        {
+            let kind = InputErrorKind::Syntax {
+                message: message.to_owned(),
+                near_text: String::new(),
+                remedy: Some(remedy),
+            };
+            return self.locate(place..place + 1).error(kind);
         }
         let near_text: String =
-            self.text.get(span).unwrap_or_default().trim().chars().take(40).collect();
-        let line_after = after.lines().next().unwrap_or_default();
+            self.text.get(span.clone()).unwrap_or_default().trim().chars().take(40).collect();
         let usual = usual_mistake(before_in_line, line_after, error.message());
         let single = single_brackets(previous_lines, before_in_line, line_after);
         let is_repeated = error.message().contains("duplicate key");
@@ -47,8 +58,71 @@ impl Document {
             || (error.message().to_owned(), None),
             |(what, remedy)| (what, Some(remedy)),
         );
-        InputErrorKind::Syntax { message, near_text, remedy }
+        self.locate(span).error(InputErrorKind::Syntax { message, near_text, remedy })
     }
+}
+
+/// Returns the list, inline table or text that an earlier line begins and does not close, where the
+/// line at the error, `before` and `after` it, cannot be a part of it: its place, and the mistake with
+/// its remedy.
+fn not_closed(
+    previous_lines: &str,
+    (before, after): (&str, &str),
+    message: &str,
+) -> Option<(usize, &'static str, &'static str)> {
+    let line = format!("{before}{after}");
+    let line = line.trim_start();
+    let is_header =
+        line.trim_start_matches('[').starts_with(char::is_alphabetic) && line.starts_with('[');
+    let key = line.split_once('=').map(|(key, _)| key.trim());
+    let is_key = key.is_some_and(|key| !key.is_empty() && !key.contains(['[', '{', '(', ',']));
+    let is_cut = ["missing comma between key", "unclosed inline", "missing key"]
+        .iter()
+        .any(|words| message.contains(words));
+    match open_at_end(previous_lines)? {
+        (place, '[') if is_header || is_key => {
+            Some((place, "the list that begins here is not closed", "write ] at its end"))
+        }
+        (place, '{') if is_header || is_cut && (is_key || message.contains("unclosed")) => {
+            Some((place, "the { that stands here is not closed", "write } at its end"))
+        }
+        (place, '"' | '\'') => Some((
+            place,
+            "the text that begins here is not closed",
+            "write the same quote at its end",
+        )),
+        _ => None,
+    }
+}
+
+/// Returns the place of the quote that a line leaves open, or else of the innermost bracket of a
+/// value that is open at the end of a text of whole lines.
+fn open_at_end(text: &str) -> Option<(usize, char)> {
+    if ["\"\"\"", "'''"].iter().any(|quotes| text.contains(quotes)) {
+        return None;
+    }
+    let (mut open, mut start) = (Vec::new(), 0);
+    for line in text.split_inclusive('\n') {
+        let is_header = open.is_empty() && line.trim_start().starts_with('[');
+        let (mut quote, mut is_escaped) = (None, false);
+        for (place, c) in line.char_indices().take_while(|_| !is_header) {
+            match (quote, c) {
+                (Some((_, '"')), _) if is_escaped => is_escaped = false,
+                (Some((_, '"')), '\\') => is_escaped = true,
+                (Some((_, mark)), _) => quote = quote.filter(|_| c != mark),
+                (None, '"' | '\'') => quote = Some((start + place, c)),
+                (None, '#') => break,
+                (None, '[' | '{') => open.push((start + place, c)),
+                (None, ']' | '}') => drop(open.pop()),
+                _ => {}
+            }
+        }
+        if quote.is_some() {
+            return quote;
+        }
+        start += line.len();
+    }
+    open.pop()
 }
 
 /// Returns the input that is expected in place of a file of another format, and where files of that
@@ -74,99 +148,153 @@ fn expected_instead_of(format: &str) -> &'static str {
 /// recognised. The line is split there into `before` and `after`.
 fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'static str)> {
     let word = after.split([' ', '\t', ',', ']', '}', '#']).next().unwrap_or_default();
+    if let Some(mistake) = typographic(word) {
+        return Some(mistake);
+    }
     let is_digit = |character: char| character.is_ascii_digit();
-    let has_decimal_comma = after
-        .strip_prefix(',')
-        .is_some_and(|next| next.starts_with(is_digit) && before.ends_with(is_digit))
-        || before
-            .strip_suffix(',')
-            .is_some_and(|number| number.ends_with(is_digit) && after.starts_with(is_digit));
+    let digits_after = after.strip_prefix(',').filter(|_| before.ends_with(is_digit));
+    let digits_after = digits_after.or_else(|| {
+        Some(after)
+            .filter(|_| before.trim_end_matches(',').ends_with(is_digit) && before.ends_with(','))
+    });
+    let has_comma = digits_after.is_some_and(|next| next.starts_with(is_digit));
+    let has_point =
+        digits_after.is_some_and(|next| next.trim_start_matches(is_digit).starts_with('.'));
     let is_in_escape = (message.contains("escape") || message.contains("unicode"))
         && (after.starts_with('\\')
             || before.rsplit('"').next().is_some_and(|text| text.contains('\\')));
-    let is_expression = word.contains(is_digit)
-        && word.contains(['/', '*', '^', 'p'])
-        && word.chars().all(|c| is_digit(c) || "+-*/^().piPI".contains(c));
-    let mistake = |what: &str, remedy| Some((what.to_owned(), remedy));
+    let value = value_at(before, after).unwrap_or_default();
+    let value = value.trim();
+    let is_in_list = before.rsplit('=').next().is_some_and(|value| value.contains('['));
+    let is_number = |word: &str| word.parse::<f64>().is_ok_and(f64::is_finite);
+    let has_numbers = |separator: &[char]| {
+        let words: Vec<&str> = value.split(separator).map(str::trim).collect();
+        words.len() > 1 && words.iter().all(|word| word.is_empty() || is_number(word))
+    };
+    let is_expression = value.contains(is_digit)
+        && (value.contains(['/', '*', '^', 'p']) || value.contains(" + ") || value.contains(" - "))
+        && value.chars().all(|c| is_digit(c) || " +-*/^().piPI".contains(c));
     let has_no_value = before.trim_end().ends_with('=')
-        && after.split('#').next().is_some_and(|rest| rest.trim().is_empty());
-    let is_spaced_list = before.contains('[')
-        && after.split([',', ']']).next().is_some_and(|entry| {
-            let mut words = entry.split_whitespace();
-            entry.split_whitespace().count() > 1 && words.all(|word| word.parse::<f64>().is_ok())
-        });
-    let is_open_list = message.contains("missing comma between array")
-        && before.trim().is_empty()
-        && after.contains('=');
-    if let Some((what, remedy)) = typographic(word) {
-        Some((what, remedy))
-    } else if has_no_value {
-        mistake("the key has no value", "write one behind the =, or delete the line")
-    } else if is_spaced_list {
-        mistake("numbers of a list without commas", "separate them by commas, as in [0.18, 0, 0]")
-    } else if is_open_list {
-        mistake(
-            "a list that begins above is not closed",
-            "write ] at its end, on a line before this one",
-        )
-    } else if has_decimal_comma {
-        mistake("a decimal comma", "write numbers with a decimal point")
-    } else if after.starts_with(['*', '?']) {
-        mistake("a pattern without quotes", "write a pattern in quotes, as in \"base.*\"")
-    } else if is_in_escape {
-        mistake(
+        && after.split(['#', ',', '}']).next().is_some_and(|rest| rest.trim().is_empty());
+    let line = format!("{before}{after}");
+    let marks = ["<<<<<<<", "=======", ">>>>>>>", "|||||||"];
+    let unit = number_and_unit(value).map(|(_, unit)| unit);
+    let is_repeated_header = message.contains("duplicate key") && before.starts_with('[');
+    let has_no_equals = message.contains("key with no value");
+    let mistakes = [
+        (
+            marks.iter().any(|mark| line.starts_with(mark)),
+            "a mark of a conflict between two versions (git)",
+            "keep the lines of one version, and delete the marks <<<<<<<, ======= and >>>>>>>",
+        ),
+        (has_no_value, "the key has no value", "write one behind the =, or delete the line"),
+        (
+            after.trim_start().starts_with(';') || value.contains(';') && has_numbers(&[';']),
+            "a semicolon",
+            "separate the numbers of a list by commas, and end a line without a sign",
+        ),
+        (
+            message.contains("unclosed array"),
+            "a list, or a text in it, that is not closed",
+            "write ] at the end of the list, and the same quote at both ends of each text",
+        ),
+        (
+            value.starts_with('('),
+            "a list in round brackets",
+            "write square ones, as in [0.18, 0, 0]",
+        ),
+        (
+            is_in_list && has_numbers(&[' ']),
+            "numbers of a list without commas",
+            "separate them by commas, as in [0.18, 0, 0]",
+        ),
+        (has_numbers(&[' ']), "spaces within a number", "write its digits without spaces"),
+        (has_comma && has_point, "a comma between thousands", "write 1000.5 for 1,000.5"),
+        (has_comma, "a decimal comma", "write numbers with a decimal point"),
+        (
+            after.starts_with(['*', '?']),
+            "a pattern without quotes",
+            "write a pattern in quotes, as in \"base.*\"",
+        ),
+        (
+            is_in_escape,
             "a \\ in double quotes begins an escape sequence",
             "in a path write / in its place, or put the path in single quotes, as in \
              'C:\\data\\rows.csv'",
-        )
-    } else if OTHER_WORDS.contains(&word.to_lowercase().as_str()) {
-        mistake("a word that TOML does not have", "write true or false, or text in quotes")
-    } else if unit_behind(before, after).as_deref() == Some("%") {
-        mistake("a percentage", "write a fraction, such as 0.3 for 30 %")
-    } else if unit_behind(before, after).is_some() {
-        mistake(
+        ),
+        (
+            OTHER_WORDS.contains(&word.to_lowercase().as_str()),
+            "a word that TOML does not have",
+            "write true or false, or text in quotes",
+        ),
+        (unit == Some("%"), "a percentage", "write a fraction, such as 0.3 for 30 %"),
+        (
+            value.contains('O') && is_number(&value.replace('O', "0")),
+            "the letter O in a number",
+            "write the digit 0",
+        ),
+        (
+            unit.is_some(),
             "a unit behind a number",
             "write the number alone; the end of the key states its unit, as in d_m = 0.36 or d_mm \
              = 360",
-        )
-    } else if is_expression {
-        mistake(
+        ),
+        (
+            is_number(value),
+            "a number as TOML does not have it",
+            "write a digit before and behind the point, and no 0 before other digits, as in 0.42, \
+             1.0 and 7",
+        ),
+        (
+            is_expression,
             "a calculation",
             "write its result, such as 0.333 for 1/3, or an angle in degrees with a key in _deg",
-        )
-    } else if message.contains("duplicate key") && before.starts_with('[') {
-        let remedy = if before.starts_with("[[") {
-            "if it is the first [[…]] of this name, a header above it is misspelt, and parts such as [[joint.body]] then began another \
-             section; otherwise write its lines into the first section of this name"
-        } else if LISTS.iter().any(|list| word.starts_with(list)) {
-            "joints, effects and the like are lists: write two brackets for each of them, as in \
-             [[joint]], the first one too"
-        } else {
-            "write its lines into the first section of this name"
-        };
-        mistake("the section is given twice", remedy)
-    } else if message.contains("key with no value") && line_has_spaced_key(after) {
-        mistake("a key with a space", "put the key in quotes, as in \"Joint 1\" = \"q1_deg\"")
-    } else if message.contains("key with no value") {
-        mistake(
+        ),
+        (
+            after.starts_with(']') && before.trim_start().starts_with('['),
+            "one ] too many",
+            "delete it",
+        ),
+        (is_repeated_header, "the section is given twice", remedy_of_header(before, word)),
+        (
+            has_no_equals && line_has_spaced_key(after),
+            "a key with a space",
+            "join the words of a key by _, as in d_m; the name of a column stands in quotes, as in \
+             \"Joint 1\" = \"q1_deg\"",
+        ),
+        (
+            has_no_equals,
             "the line is no `key = value`, no [section] and no comment",
             "write it as one, or begin it with #",
-        )
+        ),
+    ];
+    let mistake = mistakes.into_iter().find(|(is_it, ..)| *is_it);
+    mistake.map(|(_, what, remedy)| (what.to_owned(), remedy))
+}
+
+/// Returns the remedy for a header that is given twice, of which `before` holds the brackets and
+/// `word` the name.
+fn remedy_of_header(before: &str, word: &str) -> &'static str {
+    if before.starts_with("[[") {
+        "if it is the first [[…]] of this name, a header above it is misspelt, and parts such as [[joint.body]] then began another \
+         section; otherwise write its lines into the first section of this name"
+    } else if LISTS.iter().any(|list| word.starts_with(list)) {
+        "joints, effects and the like are lists: write two brackets for each of them, as in \
+         [[joint]], the first one too"
     } else {
-        None
+        "write its lines into the first section of this name"
     }
 }
 
-/// Returns the unit behind a number that stands at the place between `before` and `after`.
-fn unit_behind(before: &str, after: &str) -> Option<String> {
+/// Returns the value, or the element of a list, at the place between `before` and `after`; `None`
+/// for a key.
+fn value_at(before: &str, after: &str) -> Option<String> {
     let is_end = |c: char| ",=[]{}#".contains(c);
     let start = before.rsplit(is_end).next().unwrap_or_default();
     let end = after.split(is_end).next().unwrap_or_default();
     // A word before a = is a key.
     let is_key = after.strip_prefix(end).is_some_and(|rest| rest.starts_with('='));
-    let whole = format!("{start}{end}");
-    let (_, unit) = number_and_unit(whole.trim()).filter(|_| !is_key)?;
-    Some(unit.to_owned())
+    (!is_key).then(|| format!("{start}{end}"))
 }
 
 /// Returns the number of the line above that gives the same key in the same section.

@@ -6,30 +6,40 @@ use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use crate::error::{InputError, Location, UrdfErrorKind};
+use crate::error::{InputError, Location, UrdfErrorKind, Warning, WarningKind};
 use crate::problem::item::Document;
 use crate::problem::quoted;
+use crate::quantity::Unit;
 
-/// Key with other names and its units.
-type Key = (&'static str, &'static [&'static str], Option<[&'static str; 2]>);
-/// Units of angles and of lengths in the header.
-const ANGLES: [&str; 2] = ["deg", "rad"];
-const LENGTHS: [&str; 2] = ["mm", "m"];
-/// Keys of a joint that a table may have, with their other names and their units; those of limits
-/// depend on the joint.
-const KEYS: [Key; 6] = [
-    ("theta", &["θ", "offset"], Some(ANGLES)),
-    ("alpha", &["α", "twist"], Some(ANGLES)),
-    ("d", &["s"], Some(LENGTHS)),
-    ("a", &["r"], Some(LENGTHS)),
-    ("min", &["lower"], None),
-    ("max", &["upper"], None),
+/// Words of one meaning; the first is that of keys.
+type Names = &'static [&'static str];
+/// Key with other names and the units of its columns.
+type Key = (&'static str, Names, [Names; 2]);
+/// Units of angles and of lengths, with their other names in headers.
+const ANGLES: [Names; 2] = [&["deg", "degree", "degrees"], &["rad", "radian", "radians"]];
+const LENGTHS: [Names; 2] = [&["mm"], &["m"]];
+/// Keys of a joint that a table may have, with their other names and their units. "offset" is one of
+/// d where it is a length.
+const KEYS: [Key; 5] = [
+    ("theta", &["θ", "offset"], ANGLES),
+    ("alpha", &["α", "twist"], ANGLES),
+    ("d", &["s", "offset"], LENGTHS),
+    ("a", &["r"], LENGTHS),
+    ("theta", &["angle", "angulo", "winkel", "drehwinkel"], ANGLES),
 ];
+/// Keys of limits, whose units depend on the joint.
+const LIMITS: [(&str, [&str; 2]); 2] = [("min", ["min", "lower"]), ("max", ["max", "upper"])];
+/// Words of a header that say nothing of its key.
+const FILLERS: [&str; 5] = ["i", "joint", "link", "limit", "limits"];
+/// Letters with accents, and those without in their place.
+const ACCENTS: [&str; 2] = ["áàâãäéèêëíìîïóòôõöúùûüçñ", "aaaaaeeeeiiiiooooouuuucn"];
 
 /// Marks of a header whose α and a belong to the row before, as in the modified form.
 const OF_THE_ROW_BEFORE: [&str; 4] = ["i-1", "(i-1)", "{i-1}", "i−1"];
 /// Names of a joint coordinate in a cell, without its number.
 const COORDINATES: [&str; 6] = ["q", "θ", "theta", "t", "d", "s"];
+/// Line of the text of a problem at which the rows of its joints begin.
+const FIRST_LINE_OF_ROWS: usize = 4;
 
 /// Column of a table that is read.
 struct Column {
@@ -38,14 +48,31 @@ struct Column {
     unit: &'static str,
 }
 
-/// Returns the text of a problem with the joints of a table, whose rows are taken for standard
+/// Text of a problem with the joints of a table.
+pub(crate) struct SheetTable {
+    pub text: String,
+    pub warnings: Vec<Warning>,
+    /// Lines of the rows in the table, shape = (joints).
+    lines: Vec<usize>,
+}
+
+impl SheetTable {
+    /// Returns the place in the table of a place in the text.
+    pub fn place(&self, location: Location) -> Location {
+        let row = location.line.and_then(|line| line.checked_sub(FIRST_LINE_OF_ROWS));
+        let line = row.and_then(|row| self.lines.get(row)).copied();
+        Location { line, excerpt: None, ..location }
+    }
+}
+
+/// Returns a problem with the joints of a table, whose rows are taken for standard
 /// Denavit-Hartenberg parameters. A cell such as `q2 - 90` or `θ2` states the constant part of the
 /// coordinate that the joint moves; if that is d, the joint is prismatic.
 ///
 /// # Errors
 /// Returns an error if the file cannot be read, a column has no unit, or a cell is not a number.
-pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
-    let document = Document::read(file, UrdfErrorKind::Missing.into())?;
+pub(crate) fn text_of_table(file: &Path) -> Result<SheetTable, InputError> {
+    let (document, latin_line) = Document::read_table(file, UrdfErrorKind::Missing.into())?;
     let text = document.text.trim_start_matches('\u{feff}');
     let is_header = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
     let first = text.lines().find(is_header).unwrap_or_default();
@@ -72,7 +99,12 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
             .error(UrdfErrorKind::SheetCell { cell: error.to_string() })
     };
     let header = reader.headers().map_err(|error| bad(&error))?.clone();
-    let columns = columns(&header, |column| place(1, Some(column)))?;
+    let header_line = line(header.position());
+    let columns = columns(&header, |column| place(header_line, Some(column)))?;
+    let at = |line, kind| Warning { location: place(line, None), kind };
+    let mut warnings: Vec<Warning> =
+        latin_line.map(|line| at(line, WarningKind::ReadAsWindows1252)).into_iter().collect();
+    warnings.extend(not_taken(&header, &columns).map(|kind| at(header_line, kind)));
     let name = file.file_stem().map_or("arm".into(), |stem| stem.to_string_lossy());
     let form = if is_modified(&header) {
         "# Modified form: Rx(α) Tx(a) Rz(θ+q) Tz(d)"
@@ -80,6 +112,7 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
         "dh = \"standard\"          # Rz(θ+q) Tz(d) Tx(a) Rx(α); the header alpha_i-1, a_i-1 takes the other form"
     };
     let mut out = format!("name = {}\n{form}\njoint = [\n", quoted(&name));
+    let mut lines = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| bad(&error))?;
         let line = line(record.position());
@@ -92,37 +125,66 @@ pub(crate) fn text_of_table(file: &Path) -> Result<String, InputError> {
             return Err(place(line, None).error(UrdfErrorKind::SheetEnd { name: name.to_owned() }));
         }
         let (mut entries, mut variable) = (Vec::new(), None);
-        for column in &columns {
-            let cell = record.get(column.place).unwrap_or_default();
-            let unreadable = || {
-                let key = header.get(column.place);
-                place(line, key).error(UrdfErrorKind::SheetCell { cell: cell.to_owned() })
-            };
+        for &Column { place: index, key, unit } in &columns {
+            let cell = record.get(index).unwrap_or_default();
+            let column = || place(line, header.get(index));
+            let unreadable = || column().error(UrdfErrorKind::SheetCell { cell: cell.to_owned() });
             let comma = if delimiter == b',' { ',' } else { '.' };
             let cell = cell.replace(',', &comma.to_string());
-            let (value, is_variable) = number(&cell, column.unit).ok_or_else(unreadable)?;
+            let (value, is_variable) = number(&cell, unit).ok_or_else(unreadable)?;
             if is_variable {
-                let is_one = variable.replace(column.key).is_none();
-                if !is_one || !["theta", "d"].contains(&column.key) {
+                let is_one = variable.replace(key).is_none();
+                if !is_one || !["theta", "d"].contains(&key) {
                     return Err(unreadable());
                 }
             }
-            let is_limit = ["min", "max"].contains(&column.key);
+            let is_limit = LIMITS.iter().any(|(limit, _)| *limit == key);
             if !cell.is_empty() && (value != 0.0 || is_limit) {
-                entries.push(format!("{}_{} = {value}", column.key, column.unit));
+                if entries.iter().any(|(other, _)| *other == key) {
+                    return Err(column().error(UrdfErrorKind::SheetTwice { key }));
+                }
+                entries.push((key, format!("{key}_{unit} = {value}")));
             }
         }
-        if variable == Some("d") {
-            entries.push("kind = \"prismatic\"".to_owned());
-        }
+        let entries = entries.into_iter().map(|(_, entry)| entry);
+        let slides = (variable == Some("d")).then(|| "kind = \"prismatic\"".to_owned());
+        let entries: Vec<String> = entries.chain(slides).collect();
         let _ = writeln!(out, "  {{ {} }},", entries.join(", "));
+        lines.push(line);
     }
-    Ok(out + "]\n")
+    Ok(SheetTable { text: out + "]\n", warnings, lines })
 }
 
 /// Returns true if the header says that α and a belong to the row before.
 fn is_modified(header: &StringRecord) -> bool {
     header.iter().any(|name| OF_THE_ROW_BEFORE.iter().any(|mark| name.contains(mark)))
+}
+
+/// Returns the warning that names the columns that are not read. The first one is not named, because
+/// it numbers the joints or states their names.
+fn not_taken(header: &StringRecord, columns: &[Column]) -> Option<WarningKind> {
+    let is_taken = |place: usize| columns.iter().any(|column| column.place == place);
+    let named = header.iter().enumerate().skip(1);
+    let named = named.filter(|(place, name)| !is_taken(*place) && !name.is_empty());
+    let names: Vec<String> = named.map(|(_, name)| name.to_owned()).collect();
+    let taken = columns.iter().map(|column| format!("{}_{}", column.key, column.unit)).collect();
+    (!names.is_empty()).then_some(WarningKind::SheetColumns { names, taken })
+}
+
+/// Splits the name of a column into words in lower case, without accents and marks.
+fn words(name: &str) -> Vec<String> {
+    let lower = name.to_lowercase().replace('°', " deg ");
+    let lower = OF_THE_ROW_BEFORE.iter().fold(lower, |name, mark| name.replace(mark, " "));
+    let plain = |c: char| {
+        let [accents, letters] = ACCENTS;
+        let place = accents.chars().position(|accent| accent == c);
+        place.and_then(|place| letters.chars().nth(place)).unwrap_or(c)
+    };
+    let lower: String = lower.chars().map(plain).collect();
+    // A unit such as deg/s stays one word.
+    let words = lower.split(|c: char| !(c.is_alphanumeric() || c == '/'));
+    let words = words.filter(|word| !word.is_empty() && !FILLERS.contains(word));
+    words.map(str::to_owned).collect()
 }
 
 /// Returns the columns that hold parameters of joints. `at` is the place of a column in messages.
@@ -132,38 +194,45 @@ fn columns(
 ) -> Result<Vec<Column>, InputError> {
     let mut columns: Vec<Column> = Vec::new();
     for (place, name) in header.iter().enumerate() {
-        let lower = name.to_lowercase();
-        let end = lower.find(|c: char| !c.is_alphabetic()).unwrap_or(lower.len());
-        let (word, rest) = lower.split_at(end);
-        let mut keys = KEYS.iter();
-        let is_meant = |(key, others, _): &&Key| *key == word || others.contains(&word);
-        let Some(&(key, _, units)) = keys.find(is_meant) else { continue };
-        let rest = OF_THE_ROW_BEFORE.iter().fold(rest.to_owned(), |rest, of| rest.replace(of, ""));
-        let rest = rest.trim_start_matches('_');
-        let of_row = rest.strip_prefix('i').filter(|after| !after.starts_with(char::is_alphabetic));
-        let rest = of_row.unwrap_or(rest);
-        let unit = match rest.trim_matches(|c: char| !c.is_alphanumeric() && c != '°') {
-            "deg" | "degree" | "degrees" | "°" => Some("deg"),
-            "rad" => Some("rad"),
-            "mm" => Some("mm"),
-            "m" => Some("m"),
-            _ => None,
-        };
-        let is_right = |unit: &&str| units.is_none_or(|units| units.contains(unit));
-        if units.is_none() && unit.is_none() {
+        let words = words(name);
+        let Some((last, before)) = words.split_last() else { continue };
+        let all_units = || ANGLES.into_iter().chain(LENGTHS);
+        let unit = all_units().find(|names| names.contains(&last.as_str()));
+        let foreign = Unit::Angle.foreign_suffixes().chain(Unit::Length.foreign_suffixes());
+        let is_foreign = foreign.into_iter().any(|foreign| foreign == last);
+        let names = if unit.is_some() || is_foreign { before } else { &words };
+        let is_of = |word: &String, key: &Key| key.0 == word || key.1.contains(&word.as_str());
+        let bounds =
+            |word: &String| LIMITS.iter().find(|(_, names)| names.contains(&word.as_str()));
+        let is_known =
+            |word: &String| bounds(word).is_some() || KEYS.iter().any(|key| is_of(word, key));
+        if !names.iter().all(is_known) {
             continue;
         }
-        let unit = unit.filter(is_right).ok_or_else(|| {
-            let write = units.unwrap_or(ANGLES).map(|unit| format!("{key}_{unit}")).join(" or ");
-            at(name).error(UrdfErrorKind::SheetUnit { write })
-        })?;
+        if let Some((key, _)) = names.iter().find_map(bounds) {
+            columns.extend(unit.map(|unit| Column { place, key, unit: unit[0] }));
+            continue;
+        }
+        let mut keys = KEYS.iter().filter(|key| names.iter().any(|word| is_of(word, key)));
+        let Some(first) = keys.clone().next() else { continue };
+        let (key, unit) = keys
+            .find_map(|key| Some((key.0, unit.filter(|unit| key.2.contains(unit))?[0])))
+            .ok_or_else(|| {
+                let write = first.2.map(|unit| format!("{}_{}", first.0, unit[0])).join(" or ");
+                at(name).error(if unit.is_some() || is_foreign {
+                    UrdfErrorKind::SheetOtherUnit { found: last.clone(), write }
+                } else {
+                    UrdfErrorKind::SheetUnit { write }
+                })
+            })?;
         columns.push(Column { place, key, unit });
     }
     let has = |key: &str| columns.iter().any(|column| column.key == key);
     if !(has("alpha") && (has("a") || has("d"))) {
         return Err(at("alpha").error(UrdfErrorKind::SheetWithoutParameters));
     }
-    columns.sort_by_key(|column| KEYS.iter().position(|(key, ..)| *key == column.key));
+    let order = ["theta", "alpha", "d", "a", "min", "max"];
+    columns.sort_by_key(|column| order.iter().position(|key| *key == column.key));
     Ok(columns)
 }
 

@@ -56,11 +56,57 @@ fn a_data_sheet_may_be_a_table_with_units_in_its_header() {
     assert!(!text.contains("dh = "), "{text}");
     for (header, why) in [
         ("theta,d,a,alpha", "column theta: the column has no unit; write theta_deg or theta_rad"),
-        ("theta_deg,d_deg,alpha_deg", "column d_deg: the column has no unit; write d_mm or d_m"),
+        (
+            "theta_deg,d_deg,alpha_deg",
+            "column d_deg: deg is no unit of this column; write d_mm or d_m",
+        ),
+        ("theta_deg,d [cm],alpha_deg", "column d [cm]: cm is no unit of this column"),
+        (
+            "θ [°],offset [deg],d_mm,alpha_deg\n9,0,0,0\n9,9,0,0",
+            "another column states theta in this row",
+        ),
         ("x_mm,y_mm,z_mm,q1_deg", "no table of Denavit-Hartenberg parameters"),
         ("theta_deg,d_mm,a_mm,alpha_deg\n1,x*2,3,4", ":2: column d_mm: \"x*2\" is not a number"),
     ] {
         std::fs::write(folder.path("bad.csv"), format!("{header}\n0,0,0,0\n")).unwrap();
         assert_contains(&folder.flexcal("init bad.csv --out bad").code(2).stderr, &[why]);
     }
+}
+
+#[test]
+fn a_data_sheet_may_have_accents_and_names_what_is_not_read() {
+    let rows = "1,90,0,9,8,-20,30,v,-90\n2,0,450,9,8,-20,30,v,-90\n";
+    let folder = Folder::with([("sheet.csv", "")]);
+    let init = |header: &str| {
+        // Windows-1252 has the accented letters and ° at their place of Unicode; θ is UTF-8.
+        let bytes: Vec<u8> = if header.contains('θ') {
+            format!("{header}\n{rows}").into_bytes()
+        } else {
+            format!("{header}\n{rows}").chars().map(|c| u8::try_from(c).unwrap()).collect()
+        };
+        std::fs::write(folder.path("sheet.csv"), bytes).unwrap();
+        folder.flexcal("init sheet.csv --out arm").success().stderr
+    };
+    let row = "{ theta_deg = 90, alpha_deg = -90, a_mm = 9, min_deg = -20, max_deg = 30 }";
+    for (header, warning) in [
+        (
+            "Achse,ângulo (°),d (mm),a [mm],Vmax [°/s],mín (°),máx (°),Bemerkung,alpha_deg",
+            "sheet.csv:1: columns not taken: Vmax [°/s], Bemerkung; taken: theta_deg, alpha_deg",
+        ),
+        (
+            "i,θ offset [°],d offset [mm],a [mm],x,lower limit [°],upper limit [°],y,α [°]",
+            "sheet.csv:1: columns not taken: x, y; taken: theta_deg",
+        ),
+        (
+            "i,theta offset [deg],link offset [mm],a mm,x,theta min °,theta max °,y,twist angle (deg)",
+            "sheet.csv:1: not UTF-8 text; read as Windows-1252",
+        ),
+    ] {
+        assert_contains(&init(header), &[warning]);
+        assert_contains(&folder.read("arm/problem.toml"), &[row]);
+    }
+    let said = init("i,theta_rad,d_m,a_mm,x,min_deg,max_deg,y,alpha_rad");
+    let asked = ["an angle of 14 turns; if it is in degrees, write theta_deg", "write alpha_deg"];
+    assert_contains(&said, &asked.map(|words| words));
+    assert_contains(&said, &["sheet.csv:3: joint[2].d_m: 450 m is long for a part of an arm"]);
 }

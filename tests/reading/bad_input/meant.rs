@@ -18,7 +18,7 @@ fn values_of_another_type_are_shown_as_they_are_written() {
         ("[tool]\ntarget_m = [0.1 0 0]", &[":4: not valid TOML: numbers of a list without commas"]),
         (
             "[data]\nfiles = ['a.csv'\nposition_sigma_mm = 1",
-            &[":5: not valid TOML: a list that begins above is not closed"],
+            &[":4: not valid TOML: the list that begins here is not closed"],
         ),
         ("[tool]\ntarget_m = ['0.1', 0, 0]", &["tool.target_m[1]", "without quotes: write 0.1"]),
         ("[tool]\ntarget_m = '0, 0, 0.1'", &["write target_m = [0, 0, 0.1]"]),
@@ -51,6 +51,39 @@ fn values_of_another_type_are_shown_as_they_are_written() {
                 "delete one of the two",
             ],
         ),
+    ]);
+}
+
+#[test]
+fn usual_mistakes_of_syntax_are_named() {
+    let quote = "the text that begins here is not closed";
+    check_problems(&[
+        ("d_m = 0.36;", &["a semicolon, near `;`; separate", "end a line without a sign"]),
+        ("name = 'lift';", &["a semicolon; "]),
+        ("[tool]\ntarget_m = [0.1; 0; 0]", &["a semicolon, near `0.1; 0; 0`"]),
+        ("d_m = .42", &["a number as TOML does not have it", "as in 0.42, 1.0 and 7"]),
+        ("d_m = 1.", &["a number as TOML does not have it"]),
+        ("d_m = 0O9", &["the letter O in a number, near `0O`; write the digit 0"]),
+        ("d_m = 1 000", &["spaces within a number"]),
+        ("d_m = 1,000.5", &["a comma between thousands; write 1000.5"]),
+        ("d_m = 0,5", &["a decimal comma"]),
+        ("d_m = 0.09 + 0.1", &["a calculation"]),
+        ("d m = 0.1", &["a key with a space; join the words of a key by _, as in d_m"]),
+        ("[tool]]", &["one ] too many"]),
+        ("[tool]\ntarget_m = (0.1, 0, 0)", &[":4: not valid TOML: a list in round brackets"]),
+        ("[data]\nheld_out = { fraction = , seed = 1 }", &["the key has no value"]),
+        ("[data]\nfiles = ['a.csv'", &["a list, or a text in it, that is not closed"]),
+        ("<<<<<<< HEAD\nd_m = 1", &[":3: not valid TOML: a mark of a conflict"]),
+        ("d_m = 1\n=======\nd_m = 2\n>>>>>>> b", &[":4: not valid TOML: a mark of a conflict"]),
+        (
+            "[parameters]\n'base.*' = { sigma_mm = 1, # {\n\n'tool.*' = { free = true }",
+            &[":4: not valid TOML: the { that stands here is not closed; write } at its end"],
+        ),
+        (
+            "[tool]\ntarget_m = [0.1, 0, 0 # ]\n[data]\nfiles = ['a.csv']",
+            &[":4: not valid TOML: the list that begins here is not closed"],
+        ),
+        ("[data]\nfiles = [\"a.csv]\nheld_out = 'none'", &[":4: not valid TOML: ", quote]),
     ]);
 }
 

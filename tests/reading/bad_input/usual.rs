@@ -199,7 +199,7 @@ fn a_rule_that_a_later_rule_replaces_is_named() {
 fn limits_in_another_unit_are_asked_about() {
     let arm = parse(&format!("{ARM}min_rad = -140\nmax_rad = 3\n"));
     let (turns, write) = ("22".to_owned(), "min_deg".to_owned());
-    let expected = WarningKind::LimitLooksLikeDegrees { turns, write };
+    let expected = WarningKind::AngleLooksLikeDegrees { what: "a limit", turns, write };
     let kinds: Vec<_> = arm.plausibility_warnings().into_iter().map(|of| of.kind).collect();
     assert_eq!(kinds, [expected]);
     let rail = format!("{ARM}kind = 'prismatic'\nmin_m = 0\nmax_m = 6\n");
