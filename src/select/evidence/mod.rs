@@ -33,6 +33,7 @@ mod periodic;
 mod posterior;
 mod products;
 mod reevaluation;
+mod replacements;
 mod sag;
 mod search;
 mod settling;

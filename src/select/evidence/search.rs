@@ -8,18 +8,12 @@ use rayon::prelude::*;
 
 use super::block::Block;
 use super::products::{Products, ReducedProblem};
+use super::replacements::add_replacements;
 use super::settling::converged_sizes;
 
 /// Number of most probable sets in which the sizes of the members (1 σ of their coefficients) are
 /// iterated to convergence at the end.
 const MAX_SETTLED_SETS: usize = 32;
-/// Number of most probable sets in which a function of several covariates is replaced by two
-/// hypotheses.
-const MAX_SPLIT_SETS: usize = 3;
-/// Largest number of members of a set at which pairs of members are replaced together.
-const MAX_PAIRED_MEMBERS: usize = 6;
-/// Maximum number of passes that replace members of the most probable sets found so far.
-const MAX_EXCHANGES: usize = 4;
 
 /// Smallest probability of a set that a search returns. All other sets together have less than 1e-12.
 const MIN_LISTED_PROBABILITY: f64 = 1e-20;
@@ -47,16 +41,16 @@ impl EvaluatedSet {
 
 /// Set with the sizes of its members and ln of its posterior, up to a constant.
 #[derive(Debug, Clone)]
-struct Set {
-    members: Vec<usize>,
+pub(super) struct Set {
+    pub members: Vec<usize>,
     sizes: Vec<f64>,
     /// ln of likelihood times prior, relative to the likelihood of noise alone.
-    ln_posterior: f64,
+    pub ln_posterior: f64,
 }
 
 impl Set {
     /// Returns the members in ascending order, which identify the set.
-    fn key(&self) -> Vec<usize> {
+    pub fn key(&self) -> Vec<usize> {
         sorted(&self.members)
     }
 
@@ -72,13 +66,13 @@ impl Set {
     }
 
     /// Returns true if the set is more probable than another one by more than rounding.
-    fn exceeds(&self, other: &Self) -> bool {
+    pub fn exceeds(&self, other: &Self) -> bool {
         self.ln_posterior > other.ln_posterior + MAX_ROUNDING_OF_LN_POSTERIOR
     }
 
     /// Returns true if the set is not extended because of a member for which [`Block::is_wide`] is
     /// true.
-    fn has_wide(&self, blocks: &[Block]) -> bool {
+    pub fn has_wide(&self, blocks: &[Block]) -> bool {
         self.members.iter().any(|&member| blocks[member].is_wide())
     }
 
@@ -89,7 +83,7 @@ impl Set {
     /// this step, members that were added first would have too small a size. ln p(r | set) = l + Σ
     /// (ln p(r | the others, k) − l), with l at the sizes of all members, and ln p(r | the others,
     /// k) averaged over the size of member k.
-    fn settled(self, products: &Products) -> Self {
+    pub fn settled(self, products: &Products) -> Self {
         if self.has_wide(products.blocks) { self } else { self.with_converged_sizes(products) }
     }
 
@@ -227,130 +221,16 @@ fn add_periodic_errors(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Pro
 }
 
 /// Compares sets by their posteriors; the more probable one is the lesser.
-fn best_first(a: &Set, b: &Set) -> Ordering {
+pub(super) fn best_first(a: &Set, b: &Set) -> Ordering {
     b.ln_posterior.total_cmp(&a.ln_posterior)
 }
 
 /// Returns, for each of the `tried` hypotheses, the set extended by it.
-fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
+pub(super) fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     let new: Vec<usize> =
         tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
     let gains = products.gains(&set.members, &set.sizes, &new);
     new.into_iter().zip(gains).map(|(block, gain)| set.with(block, gain, products)).collect()
-}
-
-/// Adds sets that the stepwise search misses because the steps to them pass sets that explain less.
-///
-/// The function of several covariates is removed from probable sets, and each member and each pair
-/// of members from the best set. One and two other hypotheses are then tried in their place. This
-/// finds two causes that a third hypothesis, or a function of several covariates, explains almost
-/// as well alone. Two members are replaced by effects only, because free functions would always
-/// gain.
-fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
-    let Products { blocks, .. } = *products;
-    let every: Vec<usize> = (0..blocks.len()).collect();
-    let of = |is_of: &dyn Fn(&Block) -> bool| -> Vec<usize> {
-        every.iter().copied().filter(|&block| is_of(&blocks[block])).collect()
-    };
-    let (plain, laws) = (of(&|block| !block.is_surface), of(&|block| block.is_law()));
-    // Entry k holds the hypotheses tried as first and as second replacement: of a function of
-    // several covariates, of any other hypothesis, and of two hypotheses.
-    let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
-    let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
-    for _ in 0..MAX_EXCHANGES {
-        let mut likely: Vec<&Set> =
-            evaluated.values().filter(|set| !set.has_wide(blocks)).collect();
-        let Some(best) = likely.iter().map(|set| set.ln_posterior).reduce(f64::max) else { return };
-        likely.retain(|set| set.ln_posterior > best - LOG_ODDS_CUTOFF);
-        likely.sort_by(|a, b| best_first(a, b));
-        let is_surface = |member: &usize| blocks[*member].is_surface;
-        let surfaces = likely
-            .iter()
-            .filter_map(|set| Some((vec![set.members.iter().copied().find(is_surface)?], *set)));
-        let of_best = likely.iter().take(1).flat_map(|set| {
-            members_and_pairs(&set.members).into_iter().map(move |removed| (removed, *set))
-        });
-        let mut rests: Vec<(Vec<usize>, Vec<usize>, usize)> = Vec::new();
-        for (removed, set) in surfaces.take(MAX_SPLIT_SETS).chain(of_best) {
-            let remaining: Vec<usize> =
-                set.members.iter().copied().filter(|member| !removed.contains(member)).collect();
-            let kind =
-                if removed.len() > 1 { 2 } else { usize::from(!removed.iter().any(is_surface)) };
-            let key = sorted(&remaining);
-            // If a single member was replaced beside the same other members before, most pairs of
-            // laws were tried then.
-            let is_tried = kind == 2 && tried.contains(&(key.clone(), 1));
-            if !is_tried && tried.insert((key, kind)) {
-                rests.push((remaining, removed, kind));
-            }
-        }
-        if rests.is_empty() {
-            return;
-        }
-        let least = best - LOG_ODDS_CUTOFF;
-        let of_rest = |(rest, removed, kind): (Vec<usize>, Vec<usize>, usize)| {
-            replaced((&rest, &removed), instead[kind], least, products)
-        };
-        let new: Vec<Vec<Set>> = rests.into_par_iter().map(of_rest).collect();
-        if products.residual_model.stop.is_requested() {
-            return;
-        }
-        for set in new.into_iter().flatten() {
-            let entry = evaluated.entry(set.key()).or_insert_with(|| set.clone());
-            if set.exceeds(entry) {
-                *entry = set;
-            }
-        }
-    }
-}
-
-/// Returns sets with other hypotheses in place of the members `removed`: the members `rest` alone,
-/// and `rest` with one and with two others. Sets with ln posterior below `least` are left out.
-fn replaced(
-    (rest, removed): (&[usize], &[usize]),
-    [first, second]: [&[usize]; 2],
-    least: f64,
-    products: &Products,
-) -> Vec<Set> {
-    let Products { blocks, .. } = *products;
-    let remaining =
-        if products.residual_model.stop.is_requested() { None } else { assembled(rest, products) };
-    let Some(remaining) = remaining else { return Vec::new() };
-    let with_first = extended(&remaining, first, products);
-    let mut new: Vec<&Set> = with_first.iter().collect();
-    new.sort_by(|a, b| best_first(a, b));
-    let second: BTreeSet<usize> =
-        second.iter().copied().filter(|other| !removed.contains(other)).collect();
-    let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
-    let near: Vec<&Set> = new.iter().copied().filter(is_near).take(MAX_EXTENDING).collect();
-    let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
-    let second: Vec<usize> = second.into_iter().collect();
-    let narrow: Vec<&Set> =
-        near.into_iter().filter(|set| !set.has_wide(blocks)).take(BEAM_WIDTH).collect();
-    products.form(narrow.iter().filter_map(|set| set.members.last().copied()), &promising);
-    let longer = |(place, &set): (usize, &&Set)| {
-        extended(set, if place == 0 { &second } else { &promising }, products)
-    };
-    let two: Vec<Set> = narrow.iter().enumerate().flat_map(longer).collect();
-    new.extend(&two);
-    new.sort_by(|a, b| best_first(a, b));
-    // With converged sizes, a set may be far more probable than with sizes found one after the
-    // other.
-    let (best, others) = new.split_at(new.len().min(BEAM_WIDTH));
-    let settled: Vec<Set> = best.par_iter().map(|&set| set.clone().settled(products)).collect();
-    let probable = others.iter().copied().filter(|set| set.ln_posterior > least).cloned();
-    std::iter::once(remaining).chain(settled).chain(probable).collect()
-}
-
-/// Returns each member, and each pair of members if there are at most [`MAX_PAIRED_MEMBERS`].
-fn members_and_pairs(members: &[usize]) -> Vec<Vec<usize>> {
-    let single = members.iter().map(|&member| vec![member]);
-    let few = if members.len() <= MAX_PAIRED_MEMBERS { members } else { &[] };
-    let pairs = few
-        .iter()
-        .enumerate()
-        .flat_map(|(k, &one)| few[k + 1..].iter().map(move |&other| vec![one, other]));
-    single.chain(pairs).collect()
 }
 
 /// Returns ln p(r | all blocks together), up to a constant, plus ln of their prior; `None` if a
@@ -386,7 +266,7 @@ pub(super) fn gains_beside(
 
 /// Creates a set from the hypotheses `members`. The size of each is the most probable one when it
 /// is added to the earlier members. `None` if a Cholesky factorisation fails.
-fn assembled(members: &[usize], products: &Products) -> Option<Set> {
+pub(super) fn assembled(members: &[usize], products: &Products) -> Option<Set> {
     let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
     for &member in members {
         let gain = products.reduced(&set.members, &set.sizes)?.gain(member);

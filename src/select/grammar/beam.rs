@@ -100,12 +100,9 @@ impl<'a> Beam<'a> {
             self.extend(&front, &mut extended, &mut next);
             let changed = self.best(&next, EXCHANGED_SUMS);
             if depth > 1 {
-                let without = |sum: &Sum| {
-                    (0..sum.len()).map(|k| [&sum[..k], &sum[k + 1..]].concat()).collect::<Vec<_>>()
-                };
                 let exchanged: BTreeSet<Sum> = changed
                     .iter()
-                    .flat_map(without)
+                    .flat_map(without_one)
                     .filter(|sum| !extended.contains(sum))
                     .collect();
                 let exchanged: Vec<Sum> = exchanged.into_iter().collect();
@@ -126,6 +123,13 @@ impl<'a> Beam<'a> {
                 break;
             }
             most = of_length;
+        }
+        // No sum is claimed before it was compared with the sums that lack one of its terms.
+        for shorter in self.best(&evaluated, REFINED_SUMS).iter().flat_map(without_one) {
+            if !shorter.is_empty() && !evaluated.contains_key(&shorter) {
+                let scored = self.scored_sum(&shorter);
+                evaluated.insert(shorter, scored);
+            }
         }
         (self.terms, evaluated)
     }
@@ -279,11 +283,15 @@ impl<'a> Beam<'a> {
             if !self.is_separated(&refined) {
                 continue;
             }
-            let span = self.spanned(&refined).span;
-            let prior = ln_prior(&self.terms, &refined);
-            let scored = self.scored(span.explained_squares(), span.along.len(), prior);
+            let scored = self.scored_sum(&refined);
             next.entry(refined).or_insert(scored);
         }
+    }
+
+    /// Returns the scores of a sum.
+    fn scored_sum(&self, sum: &Sum) -> Scored {
+        let SpannedSum { span, ln_prior, .. } = self.spanned(sum);
+        self.scored(span.explained_squares(), span.along.len(), ln_prior)
     }
 
     /// Returns the columns of a term, scaled to length 1, and W times each of them.
@@ -389,6 +397,11 @@ impl<'a> Beam<'a> {
         }
         found.into_iter().map(|(sum, _)| sum).collect()
     }
+}
+
+/// Returns the sums that lack one term of a sum.
+fn without_one(sum: &Sum) -> Vec<Sum> {
+    (0..sum.len()).map(|k| [&sum[..k], &sum[k + 1..]].concat()).collect()
 }
 
 /// Returns the column scaled to length 1.
