@@ -216,6 +216,7 @@ class Identification(Fit, Forward):
             parts = self._core.predict_bounded(poses, level)
             if parts is None:
                 return None
+            warn(filter(None, [self._core.doubted_bounds]), stacklevel=5)
             _, covariance, bound, extrapolated = (np.frombuffer(part, dtype=np.float64) for part in parts)
             all_poses = _Bounded(covariance.reshape(-1, 3, 3), bound, extrapolated > 0.5)
             return _Bounded(*(part[0] for part in all_poses)) if shape.single else all_poses

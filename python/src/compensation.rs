@@ -92,6 +92,7 @@ impl Compensation {
         warnings.extend(missing.iter().map(text));
         let estimate = SavedEstimate::parse(estimate, Path::new("estimate.json"))
             .map_err(|error| raised(&error))?;
+        warnings.extend(estimate.doubted_bounds.clone());
         let rivals = rivals(&problem).unwrap_or_else(|error| {
             warnings.push(format!("{error}; what the loop did not decide is not in the bounds"));
             Vec::new()

@@ -222,6 +222,12 @@ impl Identification {
         (!self.found.is_trusted()).then(|| report::why_not_trusted(&self.found))
     }
 
+    /// What held-out rows say against the error bounds of predictions; `None` if nothing.
+    #[getter]
+    fn doubted_bounds(&self) -> Option<String> {
+        self.found.doubted_bounds()
+    }
+
     /// Texts of the findings that are warnings, with their remedies.
     #[getter]
     fn cautions(&self) -> Vec<String> {

@@ -261,7 +261,7 @@ pub fn after_loop(
     // do not depend on time.
     let doubted = result.effects.iter().filter(|found| found.is_doubted());
     let mut pairs = doubted.filter_map(|found| {
-        let rival = found.alternatives.first()?;
+        let rival = found.alternatives.iter().find(|rival| !rival.alike)?;
         let pair = [found.effect.declaration.clone(), rival.effect.declaration.clone()];
         let law = found.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
         let odds = rival.ln_odds_of_poses.map_or(law / rival.probability, f64::exp);

@@ -107,6 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
              arm by them",
         );
     }
+    common.hint(estimate.doubted_bounds.as_ref().filter(|_| trusted));
     let correction = remainder::of_estimate(&problem, &estimate);
     let rivals = design::rivals(&problem).unwrap_or_else(|error| {
         common.hint([format!("{error}; what the loop did not decide is not in the bounds")]);

@@ -4,7 +4,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::design::{self, Candidates, Criterion, EffectPair, Plan, PlanOptions, PlanProgress};
+use flexcal::design::{
+    self, Candidates, Criterion, DesignError, EffectPair, Plan, PlanOptions, PlanProgress,
+};
 use flexcal::measurement::Measurements;
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::report::{self, shell_word};
@@ -129,7 +131,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(line) = &line {
         line.clear();
     }
-    let (plan, separated) = result?;
+    let (plan, separated) = match result {
+        Err(alike @ DesignError::CausesAlike { .. }) => {
+            diagnostic::warn(&format!("--separate: {alike}"));
+            return Ok(Outcome::NotMet);
+        }
+        result => result?,
+    };
     let criterion =
         separated.as_ref().map_or(&arguments.criterion, |separated| &separated.criterion);
     let json =

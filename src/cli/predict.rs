@@ -70,6 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");
     }
+    common.hint(estimate.iter().filter_map(|of| of.doubted_bounds.as_ref()).filter(|_| trusted));
     let lacks_loads =
         estimate.as_ref().is_some_and(|estimate| common.warn_of_loads(&problem, estimate, &rows));
     // Rows without a split are predicted too. A random split applies only to the rows of the

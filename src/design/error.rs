@@ -49,6 +49,16 @@ pub enum DesignError {
         /// Description of the effect.
         effect: String,
     },
+    /// No pose distinguishes two effects.
+    #[error(
+        "for this arm they are one cause with two names, which no pose tells apart (the angle \
+         between them is 0.0° at random poses), so that no pose is planned: {}; {}", .effects[0],
+        .effects[1]
+    )]
+    CausesAlike {
+        /// Descriptions of the effects.
+        effects: [String; 2],
+    },
     /// The nominal arm has no equilibrium in any pose.
     #[error(
         "the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and \

@@ -97,7 +97,7 @@ pub struct PairSeparation {
 /// effects declared, and `options.criterion` is not used.
 ///
 /// # Errors
-/// Returns the errors of [`super::plan()`].
+/// Returns the errors of [`super::plan()`], or an error if no pose distinguishes the effects.
 pub fn separate(
     pair: &EffectPair,
     candidates: &Candidates,
@@ -114,12 +114,17 @@ pub fn separate(
     };
     let fitted = fitted_rows(&pair.declared, given);
     let given = fitted.as_ref().map(|(rows, _)| rows);
-    let criterion = pair.criterion(given.unwrap_or(&uniform))?;
-    let options = PlanOptions { criterion: &criterion, ..*options };
-    let plan = plan_beside(&pair.declared, candidates, fitted.as_ref(), &options)?;
     let with_given =
         |rows: &Measurements| given.map_or_else(|| rows.clone(), |given| given.concatenate(rows));
+    let criterion = pair.criterion(given.unwrap_or(&uniform))?;
     let uniform = Site::new(&pair.declared, &[&uniform])?.in_equilibrium(&uniform).0;
+    if pair.separation(&with_given(&uniform))?.is_alike() {
+        return Err(DesignError::CausesAlike {
+            effects: pair.effects.each_ref().map(Effect::describe),
+        });
+    }
+    let options = PlanOptions { criterion: &criterion, ..*options };
+    let plan = plan_beside(&pair.declared, candidates, fitted.as_ref(), &options)?;
     let random = (0..RANDOM_SETS).into_par_iter().map(|set| {
         let rows = choose(uniform.len(), poses, seed, RANDOM_SET_STREAM + set as u64);
         pair.separation(&with_given(&uniform.select(&rows)))

@@ -4,7 +4,9 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::fit::checks::finding::{CONSEQUENCES, Finding, FindingCode, MISTAKES, Severity};
+use crate::fit::checks::finding::{
+    CONSEQUENCES, Finding, FindingCode, MISTAKES, Severity, doubted_bounds,
+};
 use crate::fit::checks::misreading::MisreadEffect;
 use crate::fit::checks::priors::UNIT_RATIOS;
 use crate::fit::stages::fitting::FitEnd;
@@ -232,6 +234,13 @@ impl Identification {
     /// Returns true if a finding has this code.
     pub fn has(&self, code: FindingCode) -> bool {
         self.finding(code).is_some()
+    }
+
+    /// States that held-out rows contradict the error bounds of predictions; `None` if they do not.
+    #[doc(hidden)]
+    pub fn doubted_bounds(&self) -> Option<String> {
+        let findings = self.findings.iter();
+        doubted_bounds(findings.map(|finding| (finding.code.entry().code, finding.text.as_str())))
     }
 
     /// Returns the findings that are warnings, except those for which reports have a section.

@@ -154,6 +154,7 @@ fn probably_explained(result: &LoopResult) -> String {
             format!("; found in {share} % of refits on random 80 % subsets of the poses")
         });
         let again = again.unwrap_or_default();
+        let law = law.filter(|_| !found.has_two_names());
         let law = law.map_or_else(String::new, |law| format!(" ({law}{again})"));
         let rival = found
             .alternatives
@@ -247,8 +248,12 @@ pub(super) fn declared(effect: &NamedEffect) -> String {
     format!("{}: {}", effect.description, code(&effect.declaration))
 }
 
-/// Describes an effect that may act instead of a found one, with its probability.
+/// Describes an effect that may act instead of a found one, with its probability unless no pose
+/// tells the two apart.
 pub(super) fn alternative(other: &AlternativeEffect) -> String {
+    if other.alike {
+        return format!("{} (no pose tells the two apart)", other.effect.description);
+    }
     let probability = percent(other.probability);
     let from = if other.is_undecided() {
         "; poses that are left out do not tell the two apart"
@@ -272,7 +277,7 @@ pub(super) fn title(found: &FoundEffect) -> String {
 fn claim(found: &FoundEffect, words: &str) -> String {
     let status = found.status.as_str();
     match (found.status, &found.claims) {
-        (Status::Probable, Some(claims)) => {
+        (Status::Probable, Some(claims)) if !found.has_two_names() => {
             format!("{status}: {words} ({})", percent(claims.law.probability))
         }
         (Status::Located, Some(claims)) => {

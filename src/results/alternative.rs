@@ -25,6 +25,10 @@ pub struct AlternativeEffect {
     /// was not fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ln_odds_of_poses: Option<f64>,
+    /// True if no pose within the measured ranges tells this effect from the found one: for this
+    /// arm, they are one cause with two names. Absent otherwise.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub alike: bool,
     /// Parameters of this effect, fitted instead of the found one; absent if it was not fitted.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<ParameterValue>,
@@ -39,6 +43,7 @@ impl AlternativeEffect {
             effect: NamedEffect::new(effect, trace),
             probability: *probability,
             ln_odds_of_poses: fitted.map(|fitted| fitted.ln_odds),
+            alike: fitted.is_some_and(|fitted| fitted.is_alike),
             parameters: estimates.iter().map(ParameterValue::new).collect(),
         }
     }

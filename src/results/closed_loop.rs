@@ -364,6 +364,12 @@ impl FoundEffect {
         matches!(self.status, Status::Probable | Status::Located) && !self.is_only_with_others()
     }
 
+    /// Returns true if no pose tells the effect from its most probable alternative: for this arm,
+    /// they are one cause with two names.
+    pub fn has_two_names(&self) -> bool {
+        self.alternatives.first().is_some_and(|rival| rival.alike)
+    }
+
     /// Returns true if the effect is significant only together with others: no evidence was
     /// evaluated for it, and alone it is not significant.
     pub fn is_only_with_others(&self) -> bool {

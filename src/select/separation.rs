@@ -10,6 +10,10 @@ use crate::measurement::Measurements;
 use crate::problem::{Effect, Problem};
 use crate::select::settings::POWER;
 
+/// Angle between two effects \[rad\] below which no measurement distinguishes them: 0.05°. Rounding
+/// alone makes angles of less than a thousandth of that.
+const MAX_ALIKE_ANGLE: f64 = 8.7e-4;
+
 /// Measure of how well some poses distinguish two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Separation {
@@ -19,6 +23,13 @@ pub struct Separation {
     pub angle: Option<f64>,
     /// Detectability of the first effect given the second, and of the second given the first.
     pub sides: [Side; 2],
+}
+
+impl Separation {
+    /// Returns true if the poses do not distinguish the effects at all.
+    pub fn is_alike(&self) -> bool {
+        self.angle.is_some_and(|angle| angle < MAX_ALIKE_ANGLE)
+    }
 }
 
 /// Detectability of one of two effects.
@@ -84,6 +95,16 @@ pub fn separation(
         let angle = linear.angle(&linearised.columns(one), &linearised.columns(other));
         Separation { angle, sides: [side(one, other), side(other, one)] }
     })
+}
+
+/// Returns true if none of `poses` distinguishes two effects that the problem does not declare: for
+/// this arm, they are one cause with two names.
+pub(super) fn are_alike(problem: &Problem, poses: &Measurements, pair: &[Effect; 2]) -> bool {
+    let angle = with_linear(problem, &with_assumed_times(poses), pair, |linearised, linear| {
+        let [one, other] = pair.each_ref().map(|effect| linearised.columns(effect));
+        linear.angle(&one, &other)
+    });
+    angle.is_ok_and(|angle| angle.is_some_and(|angle| angle < MAX_ALIKE_ANGLE))
 }
 
 /// Returns the first of an effect's sizes, that for the unit of its first parameter; an empty one

@@ -192,6 +192,25 @@ fn a_pair_must_be_two_effects_that_poses_show() {
 }
 
 #[test]
+fn one_cause_with_two_names_is_not_planned_for() {
+    let (problem, truth) = lunar();
+    let names = ["base-compliance = true", "joint-lateral-compliance = { joint = 1 }"];
+    let poses = ranges(&truth).draw(&problem, 40, Extremes::No, 1, 0);
+    let two = pair(&problem, names).unwrap();
+    let [one, other] = &two.effects;
+    assert!(separation(&two.plain, &poses, [one, other]).unwrap().is_alike());
+    let options = PlanOptions {
+        poses: 8,
+        criterion: &Criterion::S,
+        seed: 1,
+        progress: None,
+        workspace: None,
+    };
+    let refused = separate(&two, &Candidates::Rows(Box::new(poses)), None, &options);
+    assert!(matches!(refused, Err(DesignError::CausesAlike { .. })));
+}
+
+#[test]
 fn a_spring_is_told_from_a_wave_of_its_joint() {
     let (problem, truth) = lunar();
     let poses = ranges(&truth).draw(&problem, 40, Extremes::No, 1, 0);

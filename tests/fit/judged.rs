@@ -117,6 +117,7 @@ fn held_out_rows_are_judged() {
     let clean = measured(&problem, 1);
     let found = fit(&problem, &clean);
     assert!(found.is_trusted() && found.cautions().next().is_none(), "{:?}", found.findings);
+    assert_eq!(found.doubted_bounds(), None);
     let with = |edit: &dyn Fn(&mut Dataset)| {
         let mut data = clean.clone();
         edit(&mut data);
@@ -151,6 +152,8 @@ fn held_out_rows_are_judged() {
         let wrong = with(&|data| data.measurements.positions[77].y += by);
         let [outliers] = wrong.findings.as_slice() else { panic!("{by}: {:?}", wrong.findings) };
         assert_eq!(outliers.code, FindingCode::HeldOutOutliers);
+        let doubted = wrong.doubted_bounds();
+        assert!(doubted.is_some_and(|text| text.contains("held-out rows contradict them")));
         let rows = &wrong.held_out_outliers;
         assert!(rows.len() == 1 && rows[0].row == 77 && wrong.is_trusted(), "{by}: {rows:?}");
         let words = outliers.to_string();

@@ -13,7 +13,7 @@ use super::saved_estimate_error::{
 use super::saved_posterior::SavedPosterior;
 use crate::error::{binary_format, one_line};
 use crate::files::{Changes, changed_key, read_limited};
-use crate::fit::checks::finding::RESERVATIONS;
+use crate::fit::checks::finding::{RESERVATIONS, doubted_bounds};
 use crate::fit::checks::open_views::MAX_POSE_ERROR;
 use crate::fit::checks::pose_sufficiency::label;
 use crate::fit::{Placement, Strategy};
@@ -41,6 +41,9 @@ pub struct SavedEstimate {
     pub trusted: bool,
     /// Findings that contradict a trusted fit or say that it was not judged, as texts.
     pub reservations: Vec<String>,
+    /// What held-out rows say against the error bounds of predictions; `None` if nothing.
+    #[doc(hidden)]
+    pub doubted_bounds: Option<String>,
     /// Standard deviation (1 σ) of a measured coordinate, estimated from the scatter of the fit
     /// \[m\]; `None` if the problem declares σ.
     pub estimated_sigma: Option<f64>,
@@ -207,6 +210,10 @@ impl SavedEstimate {
             changes,
             changed_key,
             trusted,
+            doubted_bounds: doubted_bounds(
+                findings.iter().flatten().map(|of| (of.code.as_str(), of.text.as_str())),
+            )
+            .map(|text| one_line(&text)),
             reservations: findings
                 .into_iter()
                 .flatten()

@@ -20,6 +20,8 @@ use crate::select::harmonic_prior::is_periodic_of_many_orders;
 use crate::select::left_out_gain::LeftOutGain;
 use crate::select::neighbourhood::tries;
 use crate::select::reference_check::{ReferenceCheck, reference_check};
+use crate::select::separating_pose::random_poses;
+use crate::select::separation::are_alike;
 use crate::select::settings::{
     MAX_FITTED_ALTERNATIVES, MIN_ALTERNATIVE_ODDS, MIN_SHARE_OF_SUBSETS,
 };
@@ -332,6 +334,8 @@ pub struct Compared {
     pub ln_odds: f64,
     /// Estimates of its parameters.
     pub estimates: Vec<Estimate>,
+    /// True if no pose within the measured ranges distinguishes the two.
+    pub is_alike: bool,
 }
 
 /// Fits the most probable alternatives of a found effect in its place, and compares the predictions
@@ -344,7 +348,12 @@ fn compare_alternatives(state: &SearchState, fitted: &Fitted, found: &Found) -> 
         let rival = state.fit(fitted, &effects).ok()?;
         let gain = LeftOutGain::new(fitted, &rival, state.data)?;
         let parameters = rival.parameters_of(effect).into_iter();
+        let without = state.problem(fitted, &others);
+        let pair = [found.effect.clone(), effect.clone()];
+        let mut poses = std::iter::once(state.data.measurements.select(state.data.rows()))
+            .chain(std::iter::once_with(|| random_poses(state.data)));
         Some(Compared {
+            is_alike: poses.all(|poses| are_alike(&without, &poses, &pair)),
             effect: effect.clone(),
             ln_odds: gain.ln_odds(fitted.sigma.min(rival.sigma)),
             estimates: parameters.map(|k| rival.found.estimates[k].clone()).collect(),
