@@ -79,8 +79,8 @@ pub(super) fn column_difference(other: &Path, has: bool) -> String {
     format!("{} {says}", other.display())
 }
 
-/// Returns the remedy for a time of the day without its date, such as `09:12:06.7`; empty for
-/// other words.
+/// Returns the remedy for a time of the day without its date, such as `09:12:06.7`; further forms
+/// of times that are read for other words.
 pub(super) fn missing_date_hint(value: &str) -> String {
     let mut parts = value.split([':', '.', ',']);
     let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
@@ -91,7 +91,8 @@ pub(super) fn missing_date_hint(value: &str) -> String {
              \"…\" = \"date\" in [data.columns]"
         )
     } else {
-        String::new()
+        ", 31.05.2024 14:03:20, 05/31/2024 2:03:20 PM, 31-May-2024 14:03:20 or 20240531 140320"
+            .to_owned()
     }
 }
 

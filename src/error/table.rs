@@ -230,7 +230,8 @@ pub enum TableErrorKind {
     NoPositionSigma,
     #[error(
         "in \"{value}\" day and month may stand in either order; write the year first \
-         (2024-05-31 14:03:20), day first with dots (31.05.2024), or month first with AM or PM"
+         (2024-05-31 14:03:20), day first with dots (31.05.2024), the month by name (31-May-2024), \
+         or month first with AM or PM"
     )]
     AmbiguousDate { value: String },
     #[error(

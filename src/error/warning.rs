@@ -128,11 +128,8 @@ pub enum WarningKind {
          seconds)"
     )]
     NotADate { value: String, write: String },
-    #[error(
-        "{value} is read {}, as {read}; if that is wrong, write dates as YYYY-MM-DD",
-        if *is_day_first { "day first, because numbers have decimal commas" } else { "month first" }
-    )]
-    DateOrderAssumed { value: String, read: String, is_day_first: bool },
+    #[error("{value} is read {order}, as {read}; if that is wrong, write dates as YYYY-MM-DD")]
+    DateOrderAssumed { value: String, read: String, order: &'static str },
     #[error(
         "its clock differs from that of the measurements: rows are paired with {offset}, \
          with which they agree; check that both tables are of one measurement"

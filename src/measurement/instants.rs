@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::join_key::is_time;
 use super::table::{Table, shortened};
-use super::time::{date_time, is_ambiguous, number_as_time};
+use super::time::{date_part, date_time, is_ambiguous, number_as_time};
 use crate::error::{InputError, TableErrorKind};
 use crate::problem::{ColumnSelector, Dialect};
 
@@ -22,8 +22,7 @@ pub(super) fn is_clock(name: &str) -> bool {
 
 /// Returns a date and a time of day as one text. Spreadsheets may write midnight behind a date.
 fn joined(date: &str, time: &str) -> String {
-    let day = date.split([' ', 'T']).next().unwrap_or(date);
-    format!("{day} {time}")
+    format!("{} {time}", date_part(date).trim_end())
 }
 
 impl Table {
@@ -127,7 +126,9 @@ impl Table {
                 let kind = TableErrorKind::AmbiguousDate { value: shortened(&word) };
                 Err(self.cell_error(place, kind))
             }
-            None if word.bytes().filter(|byte| b"-:T".contains(byte)).count() > 1 => {
+            None if word.bytes().filter(|byte| b"-:T/".contains(byte)).count() > 1
+                || !word.is_ascii() =>
+            {
                 Err(self.cell_error(place, not_a_time()))
             }
             None => match self.number(place).map(to_si) {

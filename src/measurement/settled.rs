@@ -69,10 +69,9 @@ impl Columns {
         let times = self.read.iter().find(|column| column.role == Role::Time);
         if let Some(place) = times.map(|column| column.place)
             && let value = table.instant(place)?
-            && let Some((read, is_day_first)) = assumed(&value, table.date_order(place))
+            && let Some((read, order)) = assumed(&value, table.date_order(place))
         {
-            let kind =
-                WarningKind::DateOrderAssumed { value: shortened(&value), read, is_day_first };
+            let kind = WarningKind::DateOrderAssumed { value: shortened(&value), read, order };
             warnings.push(Warning { location: table.column(table.name_of(place)), kind });
         }
         let has_times =

@@ -357,6 +357,8 @@ fn a_date_and_a_time_of_day_in_two_columns_are_one_instant() {
     let times = "[data.columns]\n'Time' = 'time'\n'Uhrzeit' = 'time'\n";
     for (map, header, day, log) in [
         ("", "Date,Time,x_mm,y_mm,z_mm", "05.11.2026", log),
+        ("", "Date,Time,x_mm,y_mm,z_mm", "05-NOV-26", log),
+        ("", "Date,Time,x_mm,y_mm,z_mm", "2026. 11. 5.", log),
         ("", "DATE,time,x_mm,y_mm,z_mm", "2026-11-05", log),
         ("", "Datum,Zeit,x_mm,y_mm,z_mm", "2026-11-05 00:00:00", log),
         (times, "Date,Time,x_mm,y_mm,z_mm", "05.11.2026", log),
