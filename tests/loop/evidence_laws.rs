@@ -104,6 +104,30 @@ fn a_slide_that_bends_as_it_goes_out_is_named() {
 }
 
 #[test]
+fn a_link_that_tilts_behind_its_joint_with_temperature_is_named() {
+    let problem = parse(
+        "name = 'elbow'\njoint = [{ d_m = 0.45 }, { alpha_deg = 90, a_m = 0.05 }, { a_m = 0.6 }, \
+         { alpha_deg = 90, a_m = 0.5 }]\ntool.target_m = [0.15, 0.02, 0.1]\n[data]\nfiles = \
+         ['m.csv']\nposition_sigma_mm = 0.03\nreference_temperature_C = 20\n[parameters]\n\
+         'joint*.*' = { sigma_deg = 0.2, sigma_mm = 1 }\n'tool.*' = { sigma_mm = 2 }\n\
+         'base.*' = { free = true }\n",
+    );
+    let text = "[random]\n'joint*.*' = { sigma_deg = 0.1, sigma_mm = 0.5 }\n[noise]\n\
+                position_sigma_mm = 0.03\n[[effect]]\nlaw = { name = 'tilt', at = \
+                'joint2.after.ry', terms = ['T'] }\nc1_deg = 0.004\n[poses]\n\
+                q1_deg = [-150, 150]\nq2_deg = [0, 120]\nq3_deg = [-130, -10]\n\
+                q4_deg = [-100, 100]\ntemperature_C = [15, 35]\n";
+    let truth = Truth::parse(text, Path::new("TRUTH.toml"), &problem).unwrap();
+    let rows = simulate(&problem, &truth, 60, 3).unwrap().rows;
+    let split = Split { identification: (0..60).collect(), held_out: Vec::new() };
+    let closure = close(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap();
+    let [found] = closure.effects.as_slice() else { panic!("{:?}", closure.effects) };
+    let Effect::Law(law) = &found.effect else { panic!("{found:?}") };
+    assert_eq!((law.site().as_str(), law.formulas().concat().as_str()), ("joint2.after.ry", "T"));
+    assert!(found.status <= Status::Probable, "{:?}", found.claims);
+}
+
+#[test]
 fn what_follows_a_covariate_is_named_and_other_functions_of_it_are_not() {
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let arm = fs::read_to_string(cases.join("problem.toml")).unwrap();

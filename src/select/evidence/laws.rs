@@ -12,10 +12,10 @@ use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Products, ReducedProblem};
 use super::search::{EvaluatedSet, reduced_by, sorted};
-use super::sites::{camera_sites, tool_site};
+use super::sites::{MOTIONS_BEHIND, camera_sites, tool_site};
 use super::waves::is_free;
 use crate::laws::expression::Vocabulary;
-use crate::laws::{Law, LawSite};
+use crate::laws::{At, Law, LawSite};
 use crate::model::parameter::{BeamField, JointField, ParameterSite};
 use crate::problem::{Effect, Joint, Problem, beam_names};
 use crate::residual_tests::Covariate;
@@ -236,8 +236,8 @@ fn searched_set<'s>(sets: &'s [EvaluatedSet], products: &Products) -> Option<&'s
 
 /// Returns the sites other than joint coordinates at which laws are searched. The laws replace
 /// those members of the most probable set that act there. The sites are tool, measurement and base,
-/// and small motions of a joint at which a function without a law acts. Returns `None` if no member
-/// acts there.
+/// small motions of a joint at which a function without a law acts, and of the frames behind that
+/// joint and the one before it. Returns `None` if no member acts there.
 fn elsewhere(
     hypotheses: &Hypotheses,
     evaluated_sets: &[EvaluatedSet],
@@ -280,8 +280,15 @@ fn elsewhere(
     for (name, lever) in camera_sites(problem) {
         add(name, lever);
     }
-    for coordinate in members.iter().filter_map(|&member| of(member).coordinate) {
-        let ParameterSite::Joint { joint, field } = coordinate else { continue };
+    let mut moved: BTreeSet<usize> = BTreeSet::new();
+    for hypothesis in members.iter().map(|&member| of(member)) {
+        if let Some(Effect::Law(law)) = hypothesis.effect()
+            && let Site::Joint(joint) = hypothesis.site
+            && matches!(law.at(), At::Before(_) | At::After(_))
+        {
+            moved.insert(joint);
+        }
+        let Some(ParameterSite::Joint { joint, field }) = hypothesis.coordinate else { continue };
         let motion = match field {
             JointField::A => "x",
             JointField::D => "z",
@@ -289,7 +296,17 @@ fn elsewhere(
             JointField::Beta => "ry",
             _ => continue,
         };
-        add(format!("joint{}.{motion}", joint + 1), coordinate);
+        moved.insert(joint);
+        add(format!("joint{}.{motion}", joint + 1), ParameterSite::Joint { joint, field });
+    }
+    // The frame behind a joint turns with it. Motions of it along and about x are those of the next
+    // joint.
+    let behind = moved.iter().flat_map(|&joint| [joint.checked_sub(1), Some(joint)]).flatten();
+    for joint in behind.collect::<BTreeSet<usize>>() {
+        for (axis, name) in MOTIONS_BEHIND {
+            let lever = ParameterSite::Joint { joint, field: JointField::After(axis) };
+            add(format!("joint{}.after.{name}", joint + 1), lever);
+        }
     }
     Some(SitesToSearch { sites, other_members })
 }

@@ -6,6 +6,11 @@ use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
 use crate::problem::{CENTRE_X, FOCAL_X, Problem};
 
+/// Small motions of the frame behind a joint at which laws are searched, each with its axis and name
+/// in files. Motions along and about x are those of the next joint, motions along and about z those
+/// of the joint's coordinate and offset.
+pub(super) const MOTIONS_BEHIND: [(usize, &str); 2] = [(1, "y"), (4, "ry")];
+
 /// Returns the parameter sites of hypotheses without a law, for which derivatives are needed in
 /// addition to those of the effects.
 pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
@@ -16,6 +21,9 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
     sites.extend((0..3).map(|axis| tool_site(problem, axis)));
     sites.extend(camera_sites(problem).map(|(_, site)| site));
     for joint in 0..problem.joints.len() {
+        let behind = MOTIONS_BEHIND
+            .map(|(axis, _)| ParameterSite::Joint { joint, field: JointField::After(axis) });
+        sites.extend(behind.into_iter().filter(|_| problem.joints[joint].takes_command()));
         sites.extend(
             [JointField::Compliance, JointField::LateralX]
                 .map(|field| ParameterSite::Joint { joint, field }),

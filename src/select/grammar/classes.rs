@@ -263,8 +263,9 @@ const PRIOR_OF_GRAMMAR: f64 = 8.0;
 const PRIOR_ELSEWHERE: f64 = 2.0;
 /// Number of sites of laws (axes or components) at each of tool, measurement, base and link.
 const AXES: f64 = 3.0;
-/// Number of small motions of a joint at which laws are searched: along x and z, and about x and y.
-const MOTIONS: f64 = 4.0;
+/// Number of small motions of a joint at which laws are searched: along x and z, about x and y, and
+/// behind the joint along and about y.
+const MOTIONS: f64 = 6.0;
 
 /// Returns ln of the prior probability of a formula from the search, relative to a family of
 /// effects; `None` for other effects.
