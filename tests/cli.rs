@@ -4,6 +4,8 @@
 
 mod common;
 
+#[path = "cli/bounds.rs"]
+mod bounds;
 #[path = "cli/compensate.rs"]
 mod compensate;
 #[path = "cli/example.rs"]

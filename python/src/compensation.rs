@@ -30,7 +30,8 @@ pub struct Compensation {
 impl Compensation {
     /// Returns the result that `flexcal compensate --json` prints.
     fn json(&self) -> String {
-        let result = CompensationResult::new(&self.problem, &self.found.commands);
+        let result = CompensationResult::new(&self.problem, &self.found.commands)
+            .with_uncorrected(&self.found.uncorrected);
         match &self.found.bounds {
             Some(bounds) => result.with_bounds(bounds).to_json(),
             None => result.to_json(),
@@ -113,7 +114,9 @@ impl Compensation {
         let (found, Doubts { misplaced, others }) =
             found.map_err(|error: CompensationError| raised(&error))?;
         warnings.extend(misplaced.into_iter().chain(others));
-        warnings.extend(report::undecided_commands(&found, &rivals).map(|(said, _)| said));
+        let undecided = report::undecided_commands(&found, &rivals).map(|(said, _)| said);
+        warnings.extend(report::uncorrected_commands(&found, undecided.is_some()));
+        warnings.extend(undecided);
         let unreached: Vec<usize> =
             found.commands.iter().filter(|of| !of.is_reached()).map(|of| of.row).collect();
         if let [first, ..] = unreached.as_slice() {

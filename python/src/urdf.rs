@@ -88,6 +88,7 @@ impl Export {
                  {judged} poses; errors lists all of them"
             )
         }));
+        warnings.extend(report::worse_than_nominal(&result));
         let (json, summary) = (result.to_json(), report::export_text(&result, &remarks));
         Ok(Self { text: moved.text, warnings, json, summary })
     }

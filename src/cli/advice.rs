@@ -12,9 +12,8 @@ use super::input::Common;
 use super::output::Results;
 use super::plan;
 
-/// Smallest number of poses that a suggested plan has to distinguish two effects.
+/// Smallest and largest number of poses that a suggested plan has to distinguish two effects.
 const MIN_SEPARATING_POSES: usize = 12;
-/// Largest number of these poses.
 const MAX_SEPARATING_POSES: usize = 60;
 /// Odds of an effect against its rival at which the cause counts as certain.
 const CERTAIN_ODDS: f64 = 19.0;
@@ -66,7 +65,8 @@ pub fn after_fit(
     let as_warned =
         |what: &str| format!("{what} as the warning says, then flexcal identify {named}");
     let correct = || as_warned(&format!("correct the table or {file}"));
-    // A remainder in the problem comes from a loop, which has searched for causes already.
+    // A loop that wrote the problem, or its remainder, has searched for causes already.
+    let is_closed = common.problem_file().ends_with("problem.closed.toml");
     let search = if is_partial {
         format!("flexcal identify {named} fits all parameters at once, elasticity included")
     } else if problem.remainder.is_some() {
@@ -74,6 +74,9 @@ pub fn after_fit(
             "flexcal trace {named} ranks candidates for what is left; {}",
             to_apply("applies the estimate with its remainder")
         )
+    } else if is_closed && !measures_no_position(problem) {
+        let apply = to_apply("corrects commands, with the error bound stated");
+        format!("{apply}; flexcal trace {named} ranks candidates for what is left")
     } else {
         format!("flexcal loop {named} looks for what the model lacks")
     };
@@ -147,9 +150,6 @@ pub fn after_fit(
         None if found.has(FindingCode::BoundInUnidentifiedDirection) => format!(
             "flexcal identify {named} -v shows what the limits cost; widen those that may be wrong"
         ),
-        None if found.noise_factor < 1.0 && !exceeds_noise(found) => format!(
-            "declare the smaller σ that the fit assumes in {file}, then flexcal identify {named}"
-        ),
         None if is_structured
             || exceeds_noise(found)
             || found.has(FindingCode::HeldOutBeyondPrediction)
@@ -170,6 +170,11 @@ pub fn after_fit(
             format!(
                 "flexcal plan {named} --poses N chooses poses over the whole range of the joints"
             )
+        }
+        // A smaller σ changes no estimate: the fit has taken it.
+        None if found.noise_factor < 1.0 && !exceeds_noise(found) => {
+            let (apply, factor) = (to_apply("corrects commands"), found.noise_factor.sqrt());
+            format!("{apply}; {file} may state a σ {factor:.2} times as large, which the fit took")
         }
         None => to_apply("corrects commands"),
     }
@@ -252,6 +257,12 @@ pub fn after_loop(
         );
     }
     if result.is_contradicted() {
+        if result.effects.is_empty() && !problem.effects.is_empty() {
+            return format!(
+                "measure poses like the held-out rows that the warnings name, then this command \
+                 with them; or flexcal identify {named}, then flexcal compensate with its bound"
+            );
+        }
         return format!(
             "follow the warnings on held-out rows before anything is applied; flexcal trace {named} \
              ranks further candidates"
@@ -454,7 +465,9 @@ fn to_export(common: &Common, problem: &Problem, estimate: &Path) -> String {
     let [named, estimate] = [common.problem(), estimate].map(shell_word);
     let export = format!("flexcal export {named} --estimate {estimate}");
     if problem.urdf.is_some() {
-        return format!("{export} --urdf ARM.urdf writes the calibrated URDF");
+        let is_rigid = problem.effects.is_empty() && !problem.is_elastic();
+        let alone = if is_rigid { "" } else { " --fitted-alone" };
+        return format!("{export} --urdf ARM.urdf{alone} writes the calibrated URDF");
     }
     let cameras = problem.fixtures.iter().filter(|fixture| fixture.kind.word() == "camera");
     let cameras: Vec<&Fixture> = cameras.collect();

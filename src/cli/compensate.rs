@@ -129,14 +129,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     correction?;
     let undecided = report::undecided_commands(&found, &rivals);
     common.hint(undecided.as_ref().map(|(said, _)| said));
-    let scale = fit::measurement_scale(&estimate).filter(|_| undecided.is_none());
-    common.hint(scale.map(|scale| {
-        format!(
-            "targets are true positions: the problem says that the measurement reads them {:.3} mm per metre too far apart (tracker-scale); \
-             if the arm errs instead, so do the commands",
-            1e3 * scale
-        )
-    }));
+    common.hint(report::uncorrected_commands(&found, undecided.is_some()));
     if found.is_base_open {
         common.hint([
             "the estimate does not know where the arm's base is in the measuring frame, so targets in that frame are reached as far as it \
@@ -151,7 +144,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let bounds = bounds.as_ref();
     let table = commands_csv(&problem, targets, commands, bounds);
     results.write(&[("commands.csv", &table)])?;
-    let mut result = CompensationResult::new(&problem, commands);
+    let mut result =
+        CompensationResult::new(&problem, commands).with_uncorrected(&found.uncorrected);
     if let Some(bounds) = bounds {
         result = result.with_bounds(bounds);
     }

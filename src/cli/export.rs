@@ -222,12 +222,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     flags.hint(absent.map(|absent| {
         format!("no errors are computed, because {} does not exist", absent.display())
     }));
-    let judged = data.as_ref().filter(|data| geometry.can_be_judged(data));
-    flags.hint((data.is_some() && judged.is_none()).then_some(
-        "no errors are computed, because the measurements do not judge the geometry of \
-         --best-rigid: some rows measure no position",
-    ));
-    let errors = match judged {
+    let errors = match &data {
         Some(data) => {
             // Bases and targets are those that occur in the data, perhaps fewer than in the fit.
             let placement = Placement::of(&data.measurements);
@@ -235,7 +230,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             let model = estimates.model(Model::new(&problem, bases, targets)?);
             let x = estimates.vector(&problem, &model)?;
             let errors = ExportedErrors::new(&model, &x, data, Some(&estimates));
-            Some(errors.with_geometries(geometry.errors(&problem, fitted, data)?))
+            let geometries = geometry.errors(&problem, fitted, data)?;
+            let is_open = geometry.best_rigid.is_some() && geometries[0].is_none();
+            flags.hint(is_open.then_some(
+                "no errors are computed, because the rows do not determine base, cameras and markers \
+                 for the geometry of --best-rigid",
+            ));
+            (!is_open).then(|| errors.with_geometries(geometries))
         }
         None => None,
     };
@@ -258,6 +259,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             next_command(arguments, &result, (&estimates, &path))
         )
     })?;
+    if let Some(worse) = report::worse_than_nominal(&result) {
+        diagnostic::warn(&worse);
+    }
     // A rigid geometry fitted to an elastic arm always misses measurements by more than σ.
     let is_strange = |alone: &&Identification| !alone.is_trusted() && !problem.is_elastic();
     if let Some(alone) = alone.filter(is_strange) {

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{ArgAction, Args};
 use flexcal::error::InputError;
 use flexcal::problem::Problem;
 use flexcal::report;
@@ -14,6 +14,7 @@ use flexcal::urdf::{Chain, Robot, TAG, complete, describe_measured, in_tree_orde
 use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
+use super::values;
 
 /// Arguments of `flexcal init`.
 #[derive(Debug, Args)]
@@ -24,6 +25,7 @@ use super::outcome::Outcome;
   flexcal init panda.urdf --tip panda_link8 --out panda --board 9x6x25
   flexcal init humanoid.urdf --tip head_camera --tip right_hand --board 9x6x25
   flexcal init panda.urdf --tip panda_link8 --out panda --tag 50
+  flexcal init panda.urdf --tip panda_link8 --out panda --board 9x6x25 --camera world
   flexcal init sheet.csv --out my-arm
   flexcal identify panda --data measurements.csv"
 )]
@@ -48,9 +50,19 @@ pub struct Arguments {
     /// square
     #[arg(long, value_name = "50", value_parser = parse_tag, conflicts_with = "board")]
     tag: Option<Board>,
+    /// Where the camera is that sees the board or tag: on the tip, or in the world, and the board
+    /// on the tip
+    #[arg(long, value_name = "tip|world", default_value = CAMERA_PLACES[0].0, action = ArgAction::Set, value_parser = values::one_of(CAMERA_PLACES))]
+    camera: bool,
     #[command(flatten)]
     flags: Flags,
 }
+
+/// Places of the camera, each with a summary, and true if it is the world.
+const CAMERA_PLACES: [(&str, &str, bool); 2] = [
+    ("tip", "On the (first) tip; the board is in the world, or on the second tip", false),
+    ("world", "Beside the arm; the board is on the tip", true),
+];
 
 impl Arguments {
     /// Returns the board or tag that a camera sees.
@@ -89,9 +101,10 @@ fn parse_tag(text: &str) -> Result<Board, String> {
 /// Completes the problem of an arm that was typed from a data sheet, as TOML or as a CSV table.
 fn complete_sheet(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let has_link = arguments.base.iter().chain(&arguments.tip).next().is_some();
-    if has_link || arguments.board().is_some() {
+    if has_link || arguments.camera || arguments.board().is_some() {
         return Err(
-            "--base, --tip, --board and --tag belong to a URDF, not to a table of joints".into()
+            "--base, --tip, --board, --tag and --camera belong to a URDF, not to a table of joints"
+                .into(),
         );
     }
     let flags = &arguments.flags;
@@ -142,14 +155,20 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut tips = arguments.tip.iter().map(|tip| Some(tip.as_str()));
     let to = |tip: Option<&str>| Chain::new(&robot, arguments.base.as_deref(), tip);
     let chain = to(tips.next().flatten())?;
-    let chain = if arguments.board().is_some() { chain.up_to_carrier_of_camera()? } else { chain };
+    let in_world = arguments.camera;
+    let is_on_tip = arguments.board().is_some() && !in_world;
+    let chain = if is_on_tip { chain.up_to_carrier_of_camera()? } else { chain };
     let further = in_tree_order(&chain, tips.map(to).collect::<Result<_, _>>()?)?;
+    if in_world && (arguments.board().is_none() || !further.is_empty()) {
+        return Err("--camera world belongs to --board or --tag on a single tip".into());
+    }
     if arguments.board().is_some() && further.len() > 1 {
         return Err(
             "--board takes one tip with the camera, and at most one that carries the board".into(),
         );
     }
-    let description = describe_measured(&chain, &further, arguments.board())?;
+    let board = arguments.board().map(|(corners, distance)| (corners, distance, in_world));
+    let description = describe_measured(&chain, &further, board)?;
     let flags = &arguments.flags;
     let results =
         flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
@@ -157,8 +176,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let file = results.path("problem.toml");
     let json = InitResult::new(&chain, &further, &description, &file).to_json();
     flags.print_result(&json, || {
-        let has_board = arguments.board().is_some();
-        report::init_text(&chain, &further, &description, (&results.folder, has_board))
+        let camera = board.map(|(.., in_world)| in_world);
+        report::init_text(&chain, &further, &description, (&results.folder, camera))
     })?;
     Ok(Outcome::Done)
 }

@@ -86,7 +86,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         (Some(estimate), Some(correction)) => {
             let CorrectedPrediction { prediction, poses } =
                 remainder::predict(&problem, estimate, correction, &rows, split.as_ref())?;
-            (prediction, Some(Bounds::new(correction, poses, arguments.level)))
+            let bounds = Bounds::new(correction, poses, arguments.level);
+            (prediction, Some(bounds.with_misfit(estimate.misfit)))
         }
         _ => (fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?, None),
     };
@@ -110,7 +111,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
     let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
-    let lengths = residuals.iter().enumerate().map(|(row, of)| (row, of.position.norm()));
+    // Targets of commands are true positions, of which readings differ by errors of the instrument.
+    let read_otherwise = match &estimate {
+        Some(estimate) => remainder::true_positions(&problem, estimate, &rows, &prediction)?,
+        None => None,
+    };
+    common.hint(read_otherwise.map(report::true_positions_sentence));
+    let measured = if read_otherwise.is_none() { residuals } else { &[] };
+    let lengths = measured.iter().enumerate().map(|(row, of)| (row, of.position.norm()));
     let lengths = lengths.filter(|(row, _)| rows.observation(*row).is_of_position());
     let lengths: Vec<(usize, f64)> = lengths.collect();
     let of_others = lengths.iter().filter(|(row, _)| fitted.binary_search(row).is_err());

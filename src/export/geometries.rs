@@ -12,6 +12,9 @@ use crate::model::Model;
 use crate::problem::{Constraint, Fixture, Joint, ParameterRule, Problem};
 use crate::remainder::Correction;
 
+/// Number of coordinates of a pose, with which the numbers of a camera or marker begin.
+const POSE_COORDINATES: usize = 6;
+
 /// Choice of the rigid geometry to export.
 #[derive(Debug, Clone)]
 pub enum GeometryChoice {
@@ -104,19 +107,15 @@ impl Geometry {
         self.rigid_model.as_ref().zip(self.fitted_alone.as_ref().map(|found| &found.x))
     }
 
-    /// Returns true if the rows of `data` that judge it show the errors of this geometry. Only
-    /// positions show those of an approximation of the whole model.
-    #[doc(hidden)]
-    pub fn can_be_judged(&self, data: &Dataset) -> bool {
-        let rows = &data.measurements;
-        self.best_rigid.is_none() || (0..rows.len()).all(|row| rows.observation(row).is_position())
-    }
-
-    /// Computes errors of three geometries: this one, the approximation of the whole model, and the
-    /// fit of a rigid model. They are errors on the held-out rows, or on the fitted rows if none is
-    /// held out. The first is `None` if this is the identified geometry. The others are `None` if
-    /// they are this one or cannot be computed. They are also `None` if the whole model is rigid
-    /// without effects, or if one of the rows measures no position.
+    /// Computes errors of five geometries: this one, the approximation of the whole model, the fit of
+    /// a rigid model, the identified one, and the nominal arm. They are errors on the held-out rows,
+    /// or on the fitted rows if none is held out.
+    ///
+    /// The first is `None` if this is the identified geometry, or if the rows do not determine its
+    /// bases, cameras and markers. The others are `None` if they are this one, cannot be computed, or
+    /// if the whole model is rigid without effects. Bases and tools are those of the whole model where
+    /// all rows measure positions. Otherwise, and for the nominal arm, bases, tools, cameras and
+    /// markers are fitted to each geometry; only then is the identified one computed.
     ///
     /// # Errors
     /// Returns an error if the estimate does not match the data.
@@ -125,7 +124,7 @@ impl Geometry {
         problem: &Problem,
         (estimate, correction): (&SavedEstimate, Option<&Correction>),
         data: &Dataset,
-    ) -> Result<[Option<ErrorSummary>; 3], ExportError> {
+    ) -> Result<[Option<ErrorSummary>; 5], ExportError> {
         let placement = Placement::of(&data.measurements);
         let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let x = estimate.vector(problem, &model)?;
@@ -136,18 +135,20 @@ impl Geometry {
             let fit::Errors { identification, held_out, .. } = alone.fitted;
             if data.split.held_out.is_empty() { identification } else { held_out }
         };
-        let alone = self.fitted_alone.as_ref().map(of_fit);
-        if !poses.iter().all(|pose| pose.observation.is_position()) {
-            return Ok([alone, None, None]);
-        }
+        let are_positions = poses.iter().all(|pose| pose.observation.is_position());
+        let refit = |arm: &Arm<f64>| refitted(problem, (&model, &x), arm, (data, rows));
         let of_arm = |best: &RigidFit| {
+            if !are_positions {
+                return refit(&best.arm);
+            }
             let rigid = rigid_errors(problem, (&model, &x), &best.arm, &poses);
-            ErrorSummary::of_rows(&data.measurements, rows.iter().copied(), &rigid)
+            Some(ErrorSummary::of_rows(&data.measurements, rows.iter().copied(), &rigid))
         };
-        let exported = self.best_rigid.as_ref().map(of_arm).or(alone);
+        let alone = self.fitted_alone.as_ref().map(of_fit);
+        let exported = self.best_rigid.as_ref().and_then(of_arm).or(alone);
         let is_elastic = |joint: &Joint| joint.stiffness.is_some() || joint.beam.is_some();
         if problem.effects.is_empty() && !problem.joints.iter().any(is_elastic) {
-            return Ok([exported, None, None]);
+            return Ok([exported, None, None, None, None]);
         }
         // The alternatives are only shown for comparison, so a failure is no error.
         let best = self.best_rigid.is_none().then(|| {
@@ -155,12 +156,64 @@ impl Geometry {
             best_rigid(problem, estimate, correction, (&workspace, self.has_room)).ok()
         });
         let alone = self.fitted_alone.is_none().then(|| fit_alone(problem, data).ok());
+        let identified = (!are_positions).then(|| refit(&model.arm(|k| x[k]))).flatten();
         Ok([
             exported,
-            best.flatten().as_ref().map(of_arm),
+            best.flatten().as_ref().and_then(of_arm),
             alone.flatten().as_ref().map(|(_, alone)| of_fit(alone)),
+            identified,
+            refit(&Arm::nominal(problem)),
         ])
     }
+}
+
+/// Returns the errors on some `rows` of `data` for a rigid arm without effects, to which bases,
+/// tools, cameras and markers are fitted; the search begins with the lenses of `model` at `x`. `None`
+/// if the rows do not determine them.
+fn refitted(
+    problem: &Problem,
+    (model, x): (&Model, &DVector<f64>),
+    arm: &Arm<f64>,
+    (data, rows): (&Dataset, &[usize]),
+) -> Option<ErrorSummary> {
+    let mut rigid = Problem { effects: Vec::new(), ..problem.clone() };
+    for (joint, fitted) in rigid.joints.iter_mut().zip(&arm.joints) {
+        (joint.stiffness, joint.beam) = (None, None);
+        if joint.placement.is_none() {
+            (joint.alpha, joint.a, joint.theta) = (fitted.alpha.value, fitted.a, fitted.theta);
+            (joint.d, joint.beta) = (fitted.d, fitted.beta.value);
+        }
+    }
+    for (fixture, fitted) in rigid.fixtures.iter_mut().zip(model.fixtures(x.as_slice())) {
+        let lens = fixture.known.iter_mut().zip(fitted.numbers).skip(POSE_COORDINATES);
+        lens.filter(|(known, _)| known.is_some()).for_each(|(known, number)| *known = Some(number));
+    }
+    let rigid = with_its_rules(rigid, data);
+    let found = fit::predict(&rigid, None, &data.measurements, Some(&data.split)).ok()?;
+    let residuals = found.residuals?;
+    let errors: Vec<_> = rows.iter().map(|&row| residuals[row].position).collect();
+    let summary = ErrorSummary::of_rows(&data.measurements, rows.iter().copied(), &errors);
+    summary.mean.norm.is_finite().then_some(summary)
+}
+
+/// Returns the problem without rules and constraints that match nothing in it, which would be
+/// errors.
+fn with_its_rules(mut rigid: Problem, data: &Dataset) -> Problem {
+    let placement = Placement::of(&data.measurements);
+    let is_valid =
+        |alone: &Problem| Model::new(alone, &placement.bases, &placement.targets).is_ok();
+    let (parameters, constraints) =
+        (std::mem::take(&mut rigid.parameters), std::mem::take(&mut rigid.constraints));
+    let matches_some = |rule: &ParameterRule| {
+        is_valid(&Problem { parameters: vec![rule.clone()], ..rigid.clone() })
+    };
+    let parameters = parameters.into_iter().filter(matches_some).collect();
+    rigid = Problem { parameters, ..rigid };
+    let holds_without = |constraint: &Constraint| {
+        is_valid(&Problem { constraints: vec![constraint.clone()], ..rigid.clone() })
+    };
+    let constraints = constraints.into_iter().filter(holds_without).collect();
+    Problem { constraints, ..rigid }
 }
 
 /// Fits a rigid model without effects; returns its problem and the fit.
@@ -168,24 +221,8 @@ fn fit_alone(
     problem: &Problem,
     data: &Dataset,
 ) -> Result<(Problem, fit::Identification), ExportError> {
-    let mut rigid = Problem { effects: Vec::new(), ..problem.clone() };
-    // Rules and constraints of effects alone would match nothing now, which is an error.
-    let placement = Placement::of(&data.measurements);
-    let matches_some = |rule: &ParameterRule| {
-        let parameters = vec![rule.clone()];
-        let constraints = Vec::new();
-        let alone = Problem { parameters, constraints, ..rigid.clone() };
-        Model::new(&alone, &placement.bases, &placement.targets).is_ok()
-    };
-    let kept = rigid.parameters.iter().filter(|rule| matches_some(rule)).cloned().collect();
-    rigid.parameters = kept;
-    let holds_without = |constraint: &Constraint| {
-        let alone = Problem { constraints: vec![constraint.clone()], ..rigid.clone() };
-        Model::new(&alone, &placement.bases, &placement.targets).is_ok()
-    };
-    let kept =
-        rigid.constraints.iter().filter(|constraint| holds_without(constraint)).cloned().collect();
-    rigid.constraints = kept;
+    let rigid = Problem { effects: Vec::new(), ..problem.clone() };
+    let rigid = with_its_rules(rigid, data);
     let options = Options::default().with_strategy(Strategy::Rigid);
     let found = fit::identify(&rigid, data, &options)?;
     Ok((rigid, found))

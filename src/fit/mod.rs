@@ -30,7 +30,7 @@ pub(crate) use apply::acceptance::{Acceptance, Accuracy, acceptance, held_out_po
 pub use apply::command_jacobian::jacobian;
 pub use apply::compensate::{Command, compensate};
 pub(crate) use apply::joint_source::{JointSources, joint_sources};
-pub(crate) use apply::missing_loads::{measurement_scale, missing_loads};
+pub(crate) use apply::missing_loads::missing_loads;
 pub use apply::predict::Residual;
 pub(crate) use apply::predict_saved::ErrorsBySession;
 pub use apply::predict_saved::{PredictError, Prediction, predict};

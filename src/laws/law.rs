@@ -381,7 +381,9 @@ impl Law {
             (LawPlace::Camera(camera), At::Camera(field)) => format!("{field} of camera {camera}"),
             (_, At::Tool(axis)) => format!("the tool {}", motion(axis)),
             (_, At::Shift(RANGE_AXIS)) => "the measured range".to_owned(),
-            (_, At::Shift(axis)) => format!("the measured position {}", motion(axis)),
+            (_, At::Shift(axis)) => {
+                format!("the measured position or the arm's base {}", motion(axis))
+            }
             (_, At::BaseShift(axis)) => format!("the base {}", motion(axis)),
             (_, At::BaseTurn(axis)) => format!("the base {}", motion(axis + 3)),
             _ => self.site(),

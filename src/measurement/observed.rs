@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::columns::{self, Columns};
-use super::role::{POINT, POSITION, Role, is_declared};
+use super::role::{POINT, POSITION, Role, is_declared, only_fixture};
 use super::table::Table;
 use super::{Measurements, narrow};
 use crate::error::{InputError, InputErrorKind};
@@ -66,7 +66,7 @@ pub(super) fn of_row(
         if are_numbers || others().any(is_taken) {
             continue;
         }
-        found.extend(of_kind(table, kind, &cells, (problem, measured))?);
+        found.extend(of_kind((table, columns), kind, &cells, (problem, measured))?);
     }
     let filled = |place: usize| columns::is_filled(table, place);
     if let (true, Some((place, write))) = (found.is_empty(), columns.undeclared(problem, filled)) {
@@ -91,14 +91,20 @@ struct Cell<'a> {
 /// Returns the observation of a kind from the filled cells of its columns; `None` if the row has no
 /// observation of this kind. Measured numbers may be missing unless the table has to be `measured`.
 fn of_kind(
-    table: &Table,
+    (table, columns): (&Table, &Columns),
     kind: &Kind,
     cells: &[Cell],
     (problem, measured): (&Problem, bool),
 ) -> Result<Option<Observed>, InputError> {
     let Some(last) = cells.last() else { return Ok(None) };
     let is_filled = |field: &Field| cells.iter().any(|cell| cell.field.name == field.name);
-    let mut lacking = kind.fields.iter().filter(|field| field.required && !is_filled(field));
+    let of_table = |field: &Field| {
+        only_fixture(field, problem).filter(|_| !columns.has(Role::Field(field.name)))
+    };
+    let mut lacking = kind
+        .fields
+        .iter()
+        .filter(|field| field.required && !is_filled(field) && of_table(field).is_none());
     let has_number = kind.measured_fields().any(is_filled);
     let lacks = match lacking.next().map(|field| (field, field.unit())) {
         Some((field, None)) => Some(field.noun),
@@ -122,7 +128,10 @@ fn of_kind(
                 let name = cell.place.map_or(Ok(cell.stem), |place| table.name(place))?;
                 fixture(table, cell.place, (field.name, name), problem)?
             }
-            (_, None) => return Ok(None),
+            (_, None) => match of_table(field) {
+                Some(only) => only,
+                None => return Ok(None),
+            },
         });
     }
     let is_measured = kind.measured_fields().all(|field| !field.required || is_filled(field));

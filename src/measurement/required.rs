@@ -1,7 +1,7 @@
 //! Check for the columns that rows other than positions need.
 
 use super::columns::Columns;
-use super::role::{Role, is_declared};
+use super::role::{Role, is_declared, only_fixture};
 use super::table::Table;
 use crate::error::{InputError, TableErrorKind, nearest};
 use crate::observation::{Content, Field, kinds};
@@ -27,7 +27,10 @@ impl Columns {
             });
             let lacks = |field: &&Field| {
                 let is_needed = field.unit().is_none() || has_number || (measured && is_named);
-                field.required && is_needed && !has_field(field)
+                field.required
+                    && is_needed
+                    && !has_field(field)
+                    && only_fixture(field, problem).is_none()
             };
             if !has_number && !is_named {
                 continue;

@@ -1,7 +1,7 @@
 //! Roles of columns and their names.
 
-use crate::observation::{Content, Kind, fields, kinds};
-use crate::problem::Problem;
+use crate::observation::{Content, Field, Kind, fields, kinds};
+use crate::problem::{Fixture, Problem};
 use crate::quantity::Unit;
 
 /// Role of a column, the quantity that it contains; joints and axes count from 0.
@@ -56,6 +56,15 @@ pub(super) fn is_declared(kind: &Kind, problem: &Problem) -> bool {
         Some(_) => fixtures.all(|field| is_fixture(field.name)),
         None => problem.data.kind_sigmas.contains_key(kind.name),
     }
+}
+
+/// Returns the index of the only camera or marker that the problem declares, if the column `field`
+/// names cameras or markers: a table may lack the column then.
+pub(super) fn only_fixture(field: &Field, problem: &Problem) -> Option<usize> {
+    let is_one = |known: &Fixture| known.kind.word() == field.name && known.kind.has_pose();
+    let mut all = problem.fixtures.iter().enumerate().filter(|(_, known)| is_one(known));
+    let (index, _) = all.next().filter(|_| field.content == Content::Fixture)?;
+    all.next().is_none().then_some(index)
 }
 
 impl Role {

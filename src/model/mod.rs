@@ -266,7 +266,8 @@ impl Model {
     }
 
     /// Returns the errors of the instrument at `x` in the readings of some `positions`, one for each
-    /// pose, measuring frame \[m\]. Motions of the bases are no errors of readings.
+    /// pose, measuring frame \[m\]. Motions of the bases are no errors of readings; turns of the
+    /// station are.
     pub(crate) fn reading_errors(
         &self,
         x: &[f64],
@@ -277,7 +278,9 @@ impl Model {
         let faultless = instrument.without_errors();
         let error = |(pose, position): (&Pose, &Vector3<f64>)| {
             let setup = &pose.setup;
-            instrument.reading(position, setup) - faultless.reading(position, setup)
+            let turn = instrument.base_rotation(setup) - faultless.base_rotation(setup);
+            let turned = Frame::from_rotation_vector(Vector3::zeros(), &turn).point(position);
+            instrument.reading(&turned, setup) - faultless.reading(position, setup)
         };
         poses.iter().zip(positions).map(error).collect()
     }

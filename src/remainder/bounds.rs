@@ -31,6 +31,9 @@ pub struct Bounds {
     scale: f64,
     /// Number of configurations whose left-out errors determine the bounds.
     learned_from: usize,
+    /// Reduced χ² of the fit if its residuals are larger than the declared noise; `None` if they are
+    /// not, or no noise is declared.
+    pub(crate) misfit: Option<f64>,
 }
 
 /// Error bounds with the errors of measured positions that they are compared with.
@@ -55,6 +58,8 @@ pub struct BoundTest {
     pub of: usize,
     /// Number of fitted configurations on which the bounds rest.
     pub learned_from: usize,
+    /// Factor by which the bounds were widened after this comparison, at least 1.
+    pub widened: f64,
 }
 
 impl BoundTest {
@@ -100,7 +105,7 @@ impl Bounds {
         for pose in &mut poses {
             pose.covariance *= scale * scale;
         }
-        Self { level, poses, lengths, scale, learned_from: scores.configurations }
+        Self { level, poses, lengths, scale, learned_from: scores.configurations, misfit: None }
     }
 
     /// Returns the bounds for the case that, with the probability `share`, each pose errs by
@@ -144,6 +149,23 @@ impl Bounds {
         self
     }
 
+    /// Returns the bounds for the case that each pose errs by `differences` \[m\] in addition.
+    #[must_use]
+    pub(super) fn with_uncorrected(mut self, differences: &[f64]) -> Self {
+        let poses = self.poses.iter_mut().zip(&mut self.lengths).zip(differences);
+        for ((pose, length), difference) in poses {
+            *length += difference;
+            pose.size = pose.size.hypot(difference / self.scale);
+        }
+        self
+    }
+
+    /// Returns the bounds with the reduced χ² of a fit whose residuals are larger than noise.
+    #[must_use]
+    pub fn with_misfit(self, misfit: Option<f64>) -> Self {
+        Self { misfit, ..self }
+    }
+
     /// Returns the bounds of some of the poses.
     pub(crate) fn of_poses(&self, chosen: &[usize]) -> Self {
         Self {
@@ -174,6 +196,7 @@ impl Bounds {
             within: excesses.values().filter(|excess| **excess <= 0.0).count(),
             of: excesses.len(),
             learned_from: self.learned_from,
+            widened: 1.0,
         }
     }
 
@@ -223,7 +246,8 @@ mod tests {
 
     #[test]
     fn bounds_that_too_many_configurations_exceed_are_contradicted() {
-        let test = |within, of| BoundTest { level: 0.95, within, of, learned_from: 28 };
+        let (level, learned_from, widened) = (0.95, 28, 1.0);
+        let test = |within, of| BoundTest { level, within, of, learned_from, widened };
         assert!([(50, 50), (41, 50), (0, 0)].iter().all(|&(k, n)| !test(k, n).is_contradicted()));
         assert!(test(16, 50).is_contradicted());
         assert!((test(50, 50).chance() - 1.0).abs() < 1e-12);
@@ -247,6 +271,7 @@ mod tests {
                 lengths: vec![0.95e-3],
                 scale: 1.0,
                 learned_from: 60,
+                misfit: None,
             };
             bounds.with_differences(quantile, share, &[difference]).bound(0)
         };

@@ -1,9 +1,12 @@
 //! Commands of an identified arm for a table of targets.
 
+use nalgebra::Vector3;
+
 use super::apply::compensate;
 use super::bounds::Bounds;
 use super::correction::Correction;
 use super::rivals::Rival;
+use super::uncorrected::{Uncorrected, uncorrected};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::{self, Command, Placement, SavedEstimate, SavedEstimateError, StageError};
 use crate::measurement::Measurements;
@@ -38,6 +41,9 @@ pub struct Compensation {
     /// For each target, how far a wrong choice among effects that the loop did not decide would
     /// move the arm \[m\]; the bounds include it. Empty without such effects.
     pub differences: Vec<f64>,
+    /// Declared effects of the instrument, by which the commands are not corrected. The bounds
+    /// include that the arm or its base moves by them instead.
+    pub uncorrected: Vec<Uncorrected>,
 }
 
 /// Error of targets for which no commands can be found.
@@ -108,21 +114,37 @@ impl Compensation {
         };
         // Where the arm is meant to be is told by the instrument, or relative to the base.
         let placed = if is_seen { targets.clone() } else { fit::seen_in_base(&model, &x, &sought) };
+        let fitted = (estimate, &x);
+        let uncorrected = uncorrected((problem, &model), fitted, (&placed, is_seen));
         let mut differences = vec![0.0_f64; if rivals.is_empty() { 0 } else { placed.len() }];
         for rival in rivals {
             let rival = rival.differences(problem, &placed)?;
             differences.iter_mut().zip(&rival).for_each(|(most, of)| *most = most.max(*of));
         }
-        let share = rivals.iter().map(|rival| rival.share).sum::<f64>().min(MAX_SHARE);
+        // What the bounds include whole is not included once more with a share.
+        let is_whole = |rival: &&Rival| {
+            let is_it = |of: &Uncorrected| of.effect.is_same_as(&rival.declared.effect.effect);
+            uncorrected.iter().any(|of| of.is_bounded && is_it(of))
+        };
+        let shared = || rivals.iter().filter(|rival| !is_whole(rival));
+        let share = shared().map(|rival| rival.share).sum::<f64>().min(MAX_SHARE);
         let bounds = match (bounds, correction) {
-            (Some(bounds), Some(correction)) if !rivals.is_empty() => {
+            (Some(bounds), Some(correction)) if shared().next().is_some() => {
                 let quantile = |level: f64| correction.scores.quantile(level);
                 Some(bounds.with_differences(quantile, share, &differences))
             }
             (bounds, _) => bounds,
         };
+        let bounds = bounds.map(|bounds| {
+            let whole = |target: usize| {
+                let of_target = uncorrected.iter().filter(|of| of.is_bounded);
+                of_target.map(|of| of.differences[target]).sum::<Vector3<f64>>().norm()
+            };
+            let whole: Vec<f64> = (0..placed.len()).map(whole).collect();
+            bounds.with_uncorrected(&whole).with_misfit(estimate.misfit)
+        });
         let is_base_open = is_seen && estimate.leaves_base_open();
-        Ok(Self { targets, commands, bounds, is_base_open, differences })
+        Ok(Self { targets, commands, bounds, is_base_open, differences, uncorrected })
     }
 
     /// Returns true if every target is reached.

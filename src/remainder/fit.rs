@@ -3,8 +3,10 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use super::bounds::BoundTest;
 use super::correction::Correction;
 use super::gain::{Gain, MeanDifference};
+use super::held_out::compare;
 use super::judge::judge;
 use super::linearise::{Linearisation, prior, timed_poses};
 use super::residuals::{CorrectedResiduals, residuals};
@@ -41,6 +43,10 @@ pub struct Fitted {
     /// if they were not.
     #[doc(hidden)]
     pub carried: Option<Carried>,
+    /// Comparison of the bounds, as they follow from the fitted rows, with the errors of held-out
+    /// configurations; `None` if none is held out.
+    #[doc(hidden)]
+    pub held_out_test: Option<BoundTest>,
     /// Errors of left-out rows with the remainder, whether it is kept or not; empty if none was
     /// fitted.
     pub(super) left_out: Vec<LeftOutRow>,
@@ -137,7 +143,10 @@ impl Fitted {
         data: &Dataset,
     ) -> Result<Self, IdentifyError> {
         let residuals = Some(residuals(found, problem, data, &remainder)?);
-        Ok(Self { remainder: Some(remainder), residuals, is_declared: true, ..self })
+        // The file of the remainder holds its scores, which stay.
+        let held_out_test = compare(&mut remainder.clone(), (found, problem), data)?
+            .map(|test| BoundTest { widened: 1.0, ..test });
+        Ok(Self { remainder: Some(remainder), residuals, is_declared: true, held_out_test, ..self })
     }
 }
 
@@ -192,8 +201,12 @@ fn fitted(
     });
     let left_out = left_out.collect();
     let correction = |conditioned| Correction::new((found, problem), &training, conditioned);
-    let alone = correction(judged.alone);
-    let remainder = judged.remainder.map(correction);
+    let mut alone = correction(judged.alone);
+    let mut held_out_test = compare(&mut alone, (found, problem), data)?;
+    let mut remainder = judged.remainder.map(correction);
+    if let Some(remainder) = &mut remainder {
+        held_out_test = compare(remainder, (found, problem), data)?;
+    }
     let residuals = remainder.as_ref().map(|kept| residuals(found, problem, data, kept));
     let residuals = residuals.transpose()?;
     Ok(Some(Fitted {
@@ -203,6 +216,7 @@ fn fitted(
         residuals,
         is_declared: false,
         carried: None,
+        held_out_test,
         left_out,
     }))
 }

@@ -15,6 +15,7 @@ mod cross_validation;
 mod declared;
 mod fit;
 mod gain;
+mod held_out;
 mod hyperparameter_search;
 mod inducing;
 mod joint_errors;
@@ -37,6 +38,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 mod training_rows;
+mod uncorrected;
 mod update;
 
 pub use apply::{CorrectedPrediction, predict};
@@ -56,6 +58,7 @@ pub use self::{
     fit::uncertainty,
     rivals::{Rival, Side},
     saved::SavedRemainderError,
+    uncorrected::{Uncorrected, true_positions},
 };
 pub(crate) use declared::earlier;
 pub(crate) use rows::InputSource;

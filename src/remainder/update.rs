@@ -26,9 +26,11 @@ use std::collections::{HashMap, HashSet};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
+use super::bounds::BoundTest;
 use super::correction::{Correction, LinearisedParameter};
 use super::fit::{Carried, Fitted, fitted_rows};
 use super::gain::Gain;
+use super::held_out::compare;
 use super::linearise::{Linearisation, prior, timed_poses};
 use super::posterior::{LeftOut, Posterior, Training};
 use super::residuals::residuals;
@@ -147,6 +149,9 @@ impl EarlierCorrections {
             remainder = Some(with.correction);
         }
         let residuals = remainder.as_ref().map(|kept| residuals(found, problem, data, kept));
+        let mut correction = remainder.as_ref().unwrap_or(&alone.correction).clone();
+        let held_out_test = compare(&mut correction, (found, problem), data)?
+            .map(|test| BoundTest { widened: 1.0, ..test });
         Ok(Some(Fitted {
             alone: alone.correction,
             remainder,
@@ -154,6 +159,7 @@ impl EarlierCorrections {
             residuals: residuals.transpose()?,
             is_declared: false,
             carried: Some(Carried { widening, positions: rows.len(), conditioning }),
+            held_out_test,
             left_out: Vec::new(),
         }))
     }

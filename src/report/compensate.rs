@@ -88,6 +88,62 @@ pub fn undecided_commands(found: &Compensation, rivals: &[Rival]) -> Option<(Str
     Some((said, next))
 }
 
+/// Returns a warning that names the effects of the instrument by which the commands are not
+/// corrected, and what to declare if they are motions of the arm; `None` if there are none.
+/// `is_undecided` is true if another warning names those that the bound does not include.
+pub fn uncorrected_commands(found: &Compensation, is_undecided: bool) -> Option<String> {
+    let named: Vec<_> =
+        found.uncorrected.iter().filter(|of| of.is_bounded || !is_undecided).collect();
+    let (mut effects, mut remedies) = (Vec::new(), Vec::new());
+    for of in &named {
+        let (rms, most) = of.sizes();
+        let name = match &of.effect {
+            Effect::Law(law) => format!("the law {} at {}", law.name(), law.site()),
+            effect => effect.name_and_place(),
+        };
+        effects.push(format!("{name} ({} mm rms, {} mm at most)", mm(rms, 3), mm(most, 3)));
+        remedies.push(moved_instead(&of.effect));
+    }
+    if effects.is_empty() {
+        return None;
+    }
+    remedies.dedup();
+    let [is, s, it] =
+        if effects.len() == 1 { ["is", "an error", "it"] } else { ["are", "errors", "them"] };
+    let covered = match (&found.bounds, named.iter().all(|of| of.is_bounded)) {
+        (Some(_), true) => "; the bound covers both",
+        (Some(_), false) if named.iter().any(|of| of.is_bounded) => {
+            "; the bound covers all but errors of lengths"
+        }
+        (Some(_), false) => "; the bound does not cover that",
+        (None, _) => "",
+    };
+    Some(format!(
+        "targets are true positions: {} {is} taken as {s} of the instrument, and the commands are \
+         not corrected for {it}; if the arm or its base moves so instead, {}{covered}",
+        effects.join(", "),
+        remedies.join(", ")
+    ))
+}
+
+/// Returns what to declare in the place of an effect of the instrument if the arm or its base moves
+/// by it.
+fn moved_instead(effect: &Effect) -> String {
+    let bases = "at base.x, base.y and base.z";
+    match effect {
+        Effect::Law(law) => match law.site().strip_prefix("measurement.") {
+            Some("range") | None => "declare it where the arm errs".to_owned(),
+            Some(axis) => format!("declare it at base.{axis}"),
+        },
+        Effect::TrackerDrift => format!("declare laws of t {bases}"),
+        Effect::TrackerSettling { .. } => format!("declare laws of exp(-t/τ) {bases}"),
+        Effect::StationShift { .. } | Effect::StationMove { .. } => {
+            "give the rows from then on a session of their own".to_owned()
+        }
+        _ => "leave it out (a certified length, measured, decides)".to_owned(),
+    }
+}
+
 /// Returns how to decide between two effects if one of them is a scale of the instrument, which poses
 /// hardly tell from errors of the arm; `None` for other effects.
 pub fn certified_length(effects: [&Effect; 2]) -> Option<String> {

@@ -61,6 +61,21 @@ pub fn better_geometry(result: &ExportResult) -> Option<&'static str> {
     (mean(&errors.rigid) > MAX_EQUAL_RATIO * least).then_some(option)
 }
 
+/// Returns a warning if the exported geometry misses the rows farther than the nominal arm.
+pub fn worse_than_nominal(result: &ExportResult) -> Option<String> {
+    let errors = result.errors()?;
+    let (rigid, nominal) = (&errors.rigid, errors.nominal.as_ref()?);
+    (mean(rigid) > mean(nominal)).then(|| {
+        let unit = rigid.norms().1;
+        format!(
+            "the exported geometry alone, without the effects that the file cannot hold, is worse than \
+             the nominal arm: it misses these rows by {} {unit}, the nominal arm by {} {unit}",
+            number(mean(rigid), 4),
+            number(mean(nominal), 4)
+        )
+    })
+}
+
 /// Returns false if the exported geometry misses the rows clearly farther than the whole model.
 pub fn holds_whole_model(result: &ExportResult) -> bool {
     result
@@ -209,7 +224,7 @@ fn comparison_blocks<'a>(
     better: Option<&'static str>,
     remarks: &ExportRemarks,
 ) -> Vec<Block<'a>> {
-    let ExportedErrors { are_held_out, whole, rigid, identified, best_rigid, fitted_alone } =
+    let ExportedErrors { are_held_out, whole, rigid, identified, best_rigid, fitted_alone, .. } =
         errors;
     let judged = if *are_held_out { "held-out" } else { "fitted" };
     let unit = rigid.norms().1;

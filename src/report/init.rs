@@ -8,12 +8,12 @@ use crate::problem::{Joint, Problem};
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM, names_of_joints};
 
 /// Describes the problem that was made from a URDF, with its `further` branches, and written to `folder`, and the next steps. If
-/// `has_camera`, these are for a camera that sees a board.
+/// `camera` is given, these are for a camera that sees a board; true: a camera in the world.
 pub fn init_text(
     chain: &Chain,
     further: &[Chain],
     description: &Description,
-    (folder, has_camera): (&Path, bool),
+    (folder, camera): (&Path, Option<bool>),
 ) -> String {
     let (base, first) = chain.ends();
     let tips: Vec<&str> = further.iter().map(|chain| chain.ends().1).collect();
@@ -31,19 +31,20 @@ pub fn init_text(
     }
     let file = folder.join("problem.toml");
     let (written, word) = (file.display(), shell_word(folder));
-    if has_camera {
+    if let Some(in_world) = camera {
+        let other = tips.first().unwrap_or(&"the world");
+        let [camera, board] = if in_world { [other, &first] } else { [&first, other] };
         let _ = write!(
             words,
             "\nWritten to {written}. Fill in there\n  \
              focal_px, centre_px  of your camera, roughly; they are fitted\n  \
              image_px             width and height of its images\n  \
              pixel_sigma          1 σ of a found corner\n  \
-             on                   the frame that carries the camera and the board; now {first} and {}\n\
+             on                   the frame that carries the camera and the board; now {camera} and {board}\n\
              and put measurements.csv beside it, with a row for each corner of each image; \
              problem.toml\nlists the columns it needs.\n\
              Where camera and board are need not be known; the views decide it.\n\
-             Next: flexcal identify {word}, then flexcal loop {word}\n",
-            tips.first().unwrap_or(&"the world")
+             Next: flexcal identify {word}, then flexcal loop {word}\n"
         );
         return words;
     }

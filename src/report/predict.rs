@@ -10,7 +10,7 @@ use super::render::Story;
 use super::row_kinds::unsteady_points;
 use crate::fit::{ErrorSummary, Prediction, rows_of_kind};
 use crate::problem::Problem;
-use crate::quantity::format::{counted, percent_of};
+use crate::quantity::format::{counted, mm, percent_of};
 use crate::remainder::{Bounds, Compared};
 
 /// Returns the predictions, with a figure of the errors of measured rows. `arm` describes the arm
@@ -79,6 +79,17 @@ pub(crate) fn prediction(
     blocks
         .push(Block::figures([draw_errors(prediction, compared.map(|compared| compared.bounds))]));
     Story::new(&problem.title, "predictions", blocks)
+}
+
+/// States that the positions of all rows are true ones of the model itself, from which its readings
+/// differ by `rms` \[m\] in root mean square.
+pub fn true_positions_sentence(rms: f64) -> String {
+    format!(
+        "the positions of these rows are true positions of the model itself, such as targets of \
+         commands.csv, and the predictions are readings of the instrument: they differ by {} mm rms, \
+         by its declared errors alone, which verifies nothing",
+        mm(rms, 3)
+    )
 }
 
 /// Returns true if all predicted rows measure positions; false if they contain no measurements.

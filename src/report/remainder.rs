@@ -274,12 +274,21 @@ pub(super) fn exceed(count: usize) -> &'static str {
 /// States how many configurations, which `noun` names, exceed their bounds if chance does not
 /// explain their number; otherwise empty. The sentence begins with a space.
 fn contradicted_bound(test: Option<&BoundTest>, noun: &str) -> String {
-    let Some(test) = test.filter(|test| test.is_contradicted()) else { return String::new() };
+    let is_said = |test: &&BoundTest| test.is_contradicted() || test.widened > 1.0;
+    let Some(test) = test.filter(is_said) else { return String::new() };
     let (beyond, of) = (test.beyond(), test.of);
     let expected = number(test.expected_beyond(), 1);
+    let so = if test.widened > 1.0 {
+        format!(
+            "the bound stated is widened by the factor {} that these errors show, and may still not hold \
+             for single poses",
+            number(test.widened, 2)
+        )
+    } else {
+        "predictions at such poses err more than the bound says".to_owned()
+    };
     format!(
-        " But {beyond} of {of} {noun} {}, and chance explains {expected}: predictions at such \
-         poses err more than the bound says.",
+        " But {beyond} of {of} {noun} {}, and chance explains {expected}: {so}.",
         exceed(beyond)
     )
 }
@@ -369,6 +378,14 @@ pub(super) fn bound_sentence(
         )
     };
     let _ = write!(words, " The {level} % bounds: {} mm, rms over these poses.", bound(main));
+    if let Some(chi2) = bounds.misfit {
+        let _ = write!(
+            words,
+            " Structure remains: the fit misses its rows by more than the declared σ (reduced χ² {}), \
+             and the bound does not hold for what the model lacks.",
+            number(chi2, 2)
+        );
+    }
     if let Some(compared) = compared
         && are_predicted(bounds, compared.errors)
     {
@@ -427,7 +444,7 @@ mod tests {
     #[test]
     fn bounds_that_too_many_held_out_positions_exceed_are_said_to_be_too_small() {
         let words = |within| {
-            let test = BoundTest { level: 0.95, within, of: 50, learned_from: 28 };
+            let test = BoundTest { level: 0.95, within, of: 50, learned_from: 28, widened: 1.0 };
             contradicted_bound(Some(&test), HELD_OUT)
         };
         assert_eq!([50, 41].map(words), [""; 2]);

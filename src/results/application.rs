@@ -12,7 +12,7 @@ use super::remainder::BoundSummary;
 use super::summary::Summary;
 use crate::fit::{Command, ErrorsBySession, PointSpread};
 use crate::problem::Problem;
-use crate::remainder::{BoundTest, Bounds, Compared};
+use crate::remainder::{BoundTest, Bounds, Compared, Uncorrected};
 use crate::urdf::{Chain, Description, names_of_joints};
 
 /// Errors of predictions against measurements.
@@ -91,8 +91,20 @@ pub struct CompensationResult {
     pub mean_turn_deg: Option<f64>,
     /// Rows of the targets that cannot be reached, counted from 1.
     pub unreached: Vec<usize>,
+    /// Declared effects of the instrument, by which commands are not corrected; the bounds include
+    /// that the arm or its base moves by them instead.
+    pub uncorrected: Vec<UncorrectedEffect>,
     #[serde(flatten)]
     pub bounds: Option<BoundSummary>,
+}
+
+/// Effect of the instrument, with what it changes in the readings at the targets.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct UncorrectedEffect {
+    /// Effect as declared in a problem.
+    pub effect: String,
+    pub rms_mm: f64,
+    pub max_mm: f64,
 }
 
 /// Problem file that was written from a URDF.
@@ -127,8 +139,20 @@ impl CompensationResult {
             mean_turn_before_deg: mean(|command| command.seed_orientation_error, f64::to_degrees),
             mean_turn_deg: mean(|command| Some(command.turn?.norm()), f64::to_degrees),
             unreached: missed.iter().map(|command| command.row + 1).collect(),
+            uncorrected: Vec::new(),
             bounds: None,
         }
+    }
+
+    /// Returns the result with the effects by which the commands are not corrected.
+    #[must_use]
+    pub fn with_uncorrected(self, uncorrected: &[Uncorrected]) -> Self {
+        let each = |of: &Uncorrected| {
+            let (rms, most) = of.sizes();
+            let effect = of.effect.declaration();
+            UncorrectedEffect { effect, rms_mm: rms * 1e3, max_mm: most * 1e3 }
+        };
+        Self { uncorrected: uncorrected.iter().map(each).collect(), ..self }
     }
 
     /// Returns the result with the expected error at the targets that are reached, and with its

@@ -60,6 +60,9 @@ pub struct ExportedErrors {
     /// exported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted_alone: Option<Summary>,
+    /// Errors of the nominal arm, with base and tool, or cameras and markers, fitted to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nominal: Option<Summary>,
 }
 
 impl ExportResult {
@@ -127,22 +130,27 @@ impl ExportedErrors {
             Summary::of(&ErrorSummary::of_rows(measurements, rows.iter().copied(), errors))
         };
         let (whole, rigid) = (of(&whole), of(&rigid));
-        let [identified, best_rigid, fitted_alone] = [None; 3];
-        Self { are_held_out, whole, rigid, identified, best_rigid, fitted_alone }
+        let [identified, best_rigid, fitted_alone, nominal] = [None; 4];
+        Self { are_held_out, whole, rigid, identified, best_rigid, fitted_alone, nominal }
     }
 
     /// Adds the errors of the exported geometry, if it is not the identified one, of the geometry
-    /// of `--best-rigid`, and of a geometry fitted alone.
+    /// of `--best-rigid`, of a geometry fitted alone, of the identified one with what was fitted to
+    /// it, and of the nominal arm.
     #[must_use]
     pub fn with_geometries(
         mut self,
-        [exported, best_rigid, fitted_alone]: [Option<ErrorSummary>; 3],
+        [exported, best_rigid, fitted_alone, identified, nominal]: [Option<ErrorSummary>; 5],
     ) -> Self {
+        if let Some(identified) = identified {
+            self.rigid = Summary::of(&identified);
+        }
         if let Some(exported) = exported {
             self.identified = Some(std::mem::replace(&mut self.rigid, Summary::of(&exported)));
         }
         self.best_rigid = best_rigid.as_ref().map(Summary::of);
         self.fitted_alone = fitted_alone.as_ref().map(Summary::of);
+        self.nominal = nominal.as_ref().map(Summary::of);
         self
     }
 }

@@ -64,15 +64,15 @@ pub const TAG: [usize; 2] = [1, 1];
 
 /// Converts a chain like [`describe`], with the chains to further tips of the same robot as branches
 /// of one tree. A `board` (numbers of corners along and across, or [`TAG`], and their distance \[mm\]) makes a
-/// problem of a camera at the tip that sees it, in the world or at the second tip; otherwise
-/// positions are measured.
+/// problem of a camera at the tip that sees it, in the world or at the second tip; the other way
+/// round if the third value is true. Otherwise positions are measured.
 ///
 /// # Errors
 /// Returns the errors of [`describe`].
 pub fn describe_measured(
     chain: &Chain,
     further: &[Chain],
-    board: Option<([usize; 2], f64)>,
+    board: Option<([usize; 2], f64, bool)>,
 ) -> Result<Description, InputError> {
     let mut notes = Vec::new();
     let (mut rows, mut tips) = (Vec::new(), Vec::new());
@@ -107,7 +107,9 @@ pub fn describe_measured(
     let names: Vec<String> =
         ends.iter().filter_map(|end| Some(rows.get(end - 1)?.name.clone())).collect();
     let view = match board {
-        Some((corners, distance)) => view(corners, distance, &names, chain.camera.as_deref()),
+        Some((corners, distance, in_world)) => {
+            view((corners, distance), in_world, &names, chain.camera.as_deref())
+        }
         None if further.is_empty() => TOOL.to_owned(),
         None => targets(&tips),
     };
@@ -358,13 +360,20 @@ fn targets(tips: &[(&str, usize)]) -> String {
 }
 
 /// Returns the sections of a camera on the tip and a board in the world, or on the second of several
-/// `tips`. The board has `columns` × `rows` corners at a `distance` \[mm\], in the order of OpenCV; a
+/// `tips`; the other way round if `is_camera_in_world`. The board has `columns` × `rows` corners at a `distance` \[mm\], in the order of OpenCV; a
 /// tag has four, in the order of its detector.
-fn view([columns, rows]: [usize; 2], distance: f64, tips: &[String], name: Option<&str>) -> String {
+fn view(
+    ([columns, rows], distance): ([usize; 2], f64),
+    is_camera_in_world: bool,
+    tips: &[String],
+    name: Option<&str>,
+) -> String {
     let on = |tip: usize| tips.get(tip).filter(|_| tips.len() > 1).map(|name| quoted(name));
-    let (camera, board) =
-        (on(0).unwrap_or("\"tool\"".to_owned()), on(1).unwrap_or("\"world\"".to_owned()));
-
+    let places = ["\"tool\"", "\"world\""].map(str::to_owned);
+    let [mut camera, mut board] = [0, 1].map(|tip| on(tip).unwrap_or(places[tip].clone()));
+    if is_camera_in_world {
+        std::mem::swap(&mut camera, &mut board);
+    }
     let corner = |k: usize| {
         let place = |count: usize| number(count as f64 * distance);
         format!("[{}, {}, 0]", place(k % columns), place(k / columns))

@@ -214,21 +214,18 @@ fn a_fit_of_few_images_is_exported_with_a_warning() {
     }
 }
 
+/// True places of a camera on the hand and a tag, for `simulate`.
+const TAG_TRUTH: &str = "[parameters]\n\"camera[camera].x\" = { mm = 30 }\n\"camera[camera].y\" = { mm = 0 }\n\
+    \"camera[camera].z\" = { mm = 50 }\n\"camera[camera].rx\" = { deg = 2 }\n\
+    \"camera[camera].ry\" = { deg = 0 }\n\"camera[camera].rz\" = { deg = 0 }\n\
+    \"marker[tag].x\" = { mm = 400 }\n\"marker[tag].y\" = { mm = 0 }\n\
+    \"marker[tag].z\" = { mm = 900 }\n\"marker[tag].rx\" = { deg = 170 }\n\
+    \"marker[tag].ry\" = { deg = 10 }\n\"marker[tag].rz\" = { deg = 0 }\n[noise]\n\
+    pixel_sigma_px = 0.2\n";
+
 #[test]
 fn a_tag_is_declared_and_its_crossed_corners_are_named() {
-    let folder = Folder::with([
-        ("arm.urdf", ARM),
-        (
-            "truth.toml",
-            "[parameters]\n\"camera[camera].x\" = { mm = 30 }\n\"camera[camera].y\" = { mm = 0 }\n\
-             \"camera[camera].z\" = { mm = 50 }\n\"camera[camera].rx\" = { deg = 2 }\n\
-             \"camera[camera].ry\" = { deg = 0 }\n\"camera[camera].rz\" = { deg = 0 }\n\
-             \"marker[tag].x\" = { mm = 400 }\n\"marker[tag].y\" = { mm = 0 }\n\
-             \"marker[tag].z\" = { mm = 900 }\n\"marker[tag].rx\" = { deg = 170 }\n\
-             \"marker[tag].ry\" = { deg = 10 }\n\"marker[tag].rz\" = { deg = 0 }\n[noise]\n\
-             pixel_sigma_px = 0.2\n",
-        ),
-    ]);
+    let folder = Folder::with([("arm.urdf", ARM), ("truth.toml", TAG_TRUTH)]);
     folder.flexcal("init arm.urdf --board 9x6x25 --tag 60").code(2);
     folder.flexcal("init arm.urdf --tip camera_optical_frame --tag 60 --out p").success();
     let corners = "points_mm = [[-30, 30, 0], [30, 30, 0], [30, -30, 0], [-30, -30, 0]]";
@@ -250,4 +247,88 @@ fn a_tag_is_declared_and_its_crossed_corners_are_named() {
             assert_contains(&run.message(), &["fit no pose of marker \"tag\"", "corners 2 and 3"]);
         }
     }
+}
+
+#[test]
+fn geometries_are_compared_by_pixels_and_a_worse_one_is_warned_of() {
+    let effect = "[[effect]]\ngear-ratio = { joint = 2 }\n";
+    let truth = format!("{effect}error_relative = 2e-2\n{TAG_TRUTH}");
+    let folder = Folder::with([("arm.urdf", ARM), ("truth.toml", truth.as_str())]);
+    folder.flexcal("init arm.urdf --tip camera_optical_frame --tag 60 --out p").success();
+    folder.map("p/problem.toml", |text| {
+        let held = "\"camera*.f*\" = { fixed = true }\n\"camera*.c*\" = { fixed = true }\n\
+                    \"camera*.k*\" = { fixed = true }\n\"camera*.p*\" = { fixed = true }";
+        let free = text.find("\"camera*.f*\"").unwrap()..text.find("# Held are").unwrap();
+        format!("{}{held}\n{}\n{effect}", &text[..free.start], &text[free.end..])
+    });
+    folder.simulate("p", "truth.toml", 40, 1, "p/measurements.csv");
+    let run = folder.flexcal("identify p --out fit").success();
+    assert_contains(&run.stdout, &["--urdf ARM.urdf --fitted-alone writes the calibrated URDF"]);
+    let export = |option: &str| {
+        let file = "--urdf arm.urdf --out new.urdf --force";
+        let command = format!("export p --estimate fit/estimate.json {file} {option}");
+        (folder.flexcal(&command).success(), folder.flexcal(&format!("{command} --json")).json())
+    };
+    let (plain, json) = export("");
+    let errors = &json["held_out"];
+    let size = |of: &str| errors[of]["mean_px"].as_f64().unwrap();
+    // Camera and tag are fitted to each geometry.
+    let [rigid, best, alone, nominal] =
+        ["rigid", "best_rigid", "fitted_alone", "nominal"].map(size);
+    assert!(alone < 1.05 * rigid && best < nominal, "{errors}");
+    assert!(size("whole") < 0.5 * alone, "{errors}");
+    assert_contains(
+        &plain.words(),
+        &["geometry fitted alone (--fitted-alone)", "held-out error, px"],
+    );
+    assert_eq!(plain.words().contains("is worse than the nominal arm"), rigid > nominal);
+    // The geometry of --best-rigid is judged by pixels as well.
+    let (run, json) = export("--best-rigid");
+    assert!(json["held_out"]["identified"]["mean_px"].is_number(), "{run:?}");
+}
+
+#[test]
+fn a_camera_in_the_world_is_declared_and_needs_no_columns_of_names() {
+    let folder = Folder::with([("arm.urdf", ARM), ("truth.toml", TAG_TRUTH)]);
+    let init = "init arm.urdf --tip camera_optical_frame --tag 60";
+    folder.flexcal("init arm.urdf --tip c --camera world").code(2);
+    let said = folder.flexcal(&format!("{init} --camera world --out w")).success();
+    assert_contains(&said.words(), &["now the world and camera_optical_frame"]);
+    let text = folder.read("w/problem.toml");
+    let (camera, marker) = text.split_once("[[marker]]").unwrap();
+    assert!(camera.contains("on = \"world\"") && marker.contains("on = \"tool\""), "{text}");
+    // A table of detections and one of joints, joined by the name of the image.
+    folder.flexcal(&format!("{init} --out p")).success();
+    folder.simulate("p", "truth.toml", 40, 1, "p/measurements.csv");
+    folder.flexcal("identify p --out named").success();
+    let table = folder.table("p/measurements.csv");
+    let [first, point, u, v] = ["q1_deg", "point", "u_px", "v_px"].map(|name| table.place(name));
+    let (mut detections, mut joints) =
+        ("image,id,u,v\n".to_owned(), "image,q1_deg,q2_deg,q3_deg\n".to_owned());
+    let mut image = String::new();
+    for (number, row) in table.rows.iter().enumerate() {
+        let line = row[first..first + 3].join(",");
+        if row[point] == "0" {
+            image = format!("{number}.png");
+            joints += &format!("{image},{line}\n");
+        }
+        detections += &format!("{image},{},{},{}\n", row[point], row[u], row[v]);
+    }
+    folder.write("p/measurements.csv", detections);
+    folder.write("p/joints.csv", joints);
+    folder.map("p/problem.toml", |text| {
+        text.replace(
+            "files = [\"measurements.csv\"]",
+            "files = [\"measurements.csv\"]\n\
+             joints = { files = [\"joints.csv\"], by = \"name\" }",
+        ) + "\n[data.columns]\n\
+             \"image\" = \"pose\"\n\"id\" = \"point\"\n\"u\" = \"u_px\"\n\"v\" = \"v_px\"\n"
+    });
+    folder.flexcal("identify p --out joined").success();
+    let found = |of: &str| folder.json(format!("{of}/estimate.json"))["parameters"].clone();
+    let value = |of: &str| {
+        let named = found(of);
+        crate::common::program::named(&named, "camera[camera].x")["estimate"].as_f64().unwrap()
+    };
+    assert!((value("named") - value("joined")).abs() < 2e-3);
 }

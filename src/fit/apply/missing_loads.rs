@@ -76,10 +76,3 @@ fn missing_time(
         effect.effect.name()
     ))
 }
-
-/// Returns the identified relative error of measured lengths; `None` if the problem declares no
-/// `tracker-scale`.
-pub(crate) fn measurement_scale(estimate: &SavedEstimate) -> Option<f64> {
-    let scale = estimate.parameters.iter().find(|of| of.name.starts_with("tracker-scale"));
-    scale.map(|entry| entry.estimate)
-}

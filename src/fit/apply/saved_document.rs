@@ -46,6 +46,8 @@ pub(super) struct Document {
     pub covariance: Option<Vec<Vec<Option<f64>>>>,
     pub sigma_taken_mm: Option<f64>,
     pub noise_factor: Option<f64>,
+    pub reduced_chi2: Option<f64>,
+    pub chance: Option<(f64, f64)>,
     pub fitted_rows: Option<HashSet<String>>,
     pub prior: Option<PriorEntry>,
     pub findings: Option<Vec<FindingEntry>>,

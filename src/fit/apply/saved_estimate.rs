@@ -27,6 +27,9 @@ use crate::problem::item::MAX_MAGNITUDE;
 /// Smallest identified share of a parameter, 0…1, at which the data determine it.
 const MIN_IDENTIFIED_SHARE: f64 = 0.99;
 
+/// Largest deviation of a factor from 1 that rounding explains.
+const MAX_ROUNDING: f64 = 1e-9;
+
 /// Identified arm as saved in an `estimate.json`.
 #[derive(Debug, Clone)]
 pub struct SavedEstimate {
@@ -47,6 +50,9 @@ pub struct SavedEstimate {
     /// Standard deviation (1 σ) of a measured coordinate, estimated from the scatter of the fit
     /// \[m\]; `None` if the problem declares σ.
     pub estimated_sigma: Option<f64>,
+    /// Reduced χ² of the fit if its residuals are larger than the declared noise; `None` otherwise.
+    #[doc(hidden)]
+    pub misfit: Option<f64>,
     /// Start time of each session, relative to which time-dependent terms are evaluated; `None` in
     /// files of older versions.
     pub start_times: Option<StartTimes>,
@@ -164,6 +170,8 @@ impl SavedEstimate {
             covariance,
             sigma_taken_mm,
             noise_factor,
+            reduced_chi2,
+            chance,
             fitted_rows,
             prior,
             findings,
@@ -220,6 +228,13 @@ impl SavedEstimate {
                 .filter(|of| RESERVATIONS.iter().any(|code| code.entry().code == of.code))
                 .map(|of| one_line(&of.text))
                 .collect(),
+            misfit: reduced_chi2.filter(|chi2| {
+                let factor = noise_factor.unwrap_or(1.0);
+                let is_known = (factor - 1.0).abs() <= MAX_ROUNDING;
+                let exceeds = chance.is_some_and(|(_, high)| *chi2 > high);
+                let is_large = if is_known { exceeds } else { factor > 1.0 };
+                estimated_sigma.is_none() && remainder.is_none() && is_large
+            }),
             estimated_sigma,
             start_times: first_time_s
                 .map(|first| StartTimes { first, sessions: session_times_s.unwrap_or_default() }),

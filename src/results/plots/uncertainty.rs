@@ -115,29 +115,7 @@ impl Uncertainty {
             level: BOUND_LEVEL,
             bounds: bounds.filter(|at| at.bound.is_finite()).collect(),
             joints: correction.joint_errors(DRAWN_COMMANDS),
-            test: bound_test((found, problem), data, fitted)?,
+            test: fitted.held_out_test,
         })
     }
-}
-
-/// Compares the error bounds with the position errors of the held-out configurations; `None`
-/// without held-out positions.
-fn bound_test(
-    (found, problem): (&Identification, &Problem),
-    data: &Dataset,
-    fitted: &Fitted,
-) -> Result<Option<BoundTest>, IdentifyError> {
-    let table = &data.measurements;
-    let is_position = |row: &usize| table.observation(*row).is_position();
-    let held_out: Vec<usize> = data.split.held_out.iter().copied().filter(is_position).collect();
-    if held_out.is_empty() {
-        return Ok(None);
-    }
-    // Effects with memory depend on the poses before, whether these are held out or not.
-    let rows = table.select_with_past(&held_out);
-    let (positions, corrected) = predict_identified(found, problem, fitted.correction(), &rows)?;
-    let bounds = Bounds::new(fitted.correction(), corrected, BOUND_LEVEL);
-    let errors = positions.iter().zip(&rows.positions).map(|(at, measured)| (measured - at).norm());
-    let errors = errors.enumerate().map(|(pose, error)| (pose, pose, error));
-    Ok(Some(bounds.test(&rows, errors)))
 }
