@@ -82,7 +82,6 @@ pub use uncertainty::shadow_price::ShadowPrice;
 pub use self::{
     apply::compensate::{seen_from_base, seen_in_base, waypoints},
     checks::finding::FindingEntry,
-    checks::misreading::Misreading,
     compare::comparison::{CompareOptions, Comparison, compare},
     identification::identify_model,
     residual_function::{ResidualFunction, ResidualOrigin},

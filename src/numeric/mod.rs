@@ -24,6 +24,26 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(if sorted.len() % 2 == 1 { upper } else { 0.5 * (sorted[sorted.len() / 2 - 1] + upper) })
 }
 
+/// Returns the different numbers among some values, in ascending order.
+pub(crate) fn levels(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut levels: Vec<f64> = values.into_iter().collect();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    levels
+}
+
+/// Returns at most `count` of some items, evenly spaced.
+pub(crate) fn spaced<T>(items: Vec<T>, count: usize) -> Vec<T> {
+    let step = items.len().div_ceil(count).max(1);
+    items.into_iter().step_by(step).collect()
+}
+
+/// Returns the root of the mean of some squares; 0 if there are none.
+pub(crate) fn root_mean(squares: impl IntoIterator<Item = f64>) -> f64 {
+    let (count, sum) = squares.into_iter().fold((0, 0.0), |(n, sum), square| (n + 1, sum + square));
+    (sum / f64::from(count.max(1))).sqrt()
+}
+
 /// Returns the integer part of a count or index of at least 0; 0 for smaller values and for NaN.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts are limited")]
 pub(crate) fn whole(value: f64) -> usize {

@@ -5,7 +5,7 @@ use crate::common::arms::parse;
 use crate::common::made::{
     at_random, divided, draw, fit, fit_as_command, labels, measure, model_of, of_targets,
 };
-use flexcal::fit::{FindingCode, Misreading};
+use flexcal::fit::FindingCode;
 use flexcal::measurement::{CommandColumn, Dataset};
 use flexcal::problem::{Problem, Robust, RobustLoss};
 use flexcal::quantity::Unit;
@@ -283,22 +283,22 @@ fn what_may_have_been_misread_is_said() {
         }
     };
     let degree = std::f64::consts::PI / 180.0;
-    assert_eq!(with(&scaled(degree)), [Misreading::Radians.to_string()]);
-    assert_eq!(with(&scaled(1.0 / degree)), [Misreading::Degrees.to_string()]);
-    assert_eq!(with(&sized(1e3)), [Misreading::Millimetres.to_string()]);
-    assert_eq!(with(&sized(1e-3)), [Misreading::Metres.to_string()]);
+    assert_eq!(with(&scaled(degree)), ["joint angles that are radians, declared as degrees"]);
+    assert_eq!(with(&scaled(1.0 / degree)), ["joint angles that are degrees, declared as radians"]);
+    assert_eq!(with(&sized(1e3)), ["positions that are millimetres, declared as metres"]);
+    assert_eq!(with(&sized(1e-3)), ["positions that are metres, declared as millimetres"]);
     let mirrored = with(&|_, data| {
         data.measurements.positions.iter_mut().for_each(|position| position.swap_rows(0, 2));
     });
-    assert_eq!(mirrored, [Misreading::Mirrored { axes: None }.to_string()]);
+    assert_eq!(mirrored, ["two of x, y and z that are exchanged, or one of the other sign"]);
     let reversed = with(&|_, data| {
         data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q);
     });
-    assert_eq!(reversed, [Misreading::reversed(&[3]).to_string()]);
+    assert_eq!(reversed, ["joint 3 that counts the other way"]);
     let opposite = with(&|_, data| {
         data.measurements.configurations.chunks_exact_mut(5).for_each(<[f64]>::reverse);
     });
-    assert_eq!(opposite, [Misreading::OppositeOrder.to_string()]);
+    assert_eq!(opposite, ["columns of all joints in the opposite order"]);
     // Columns as in a message joint_states, which lists joints by name.
     let sorted = with(&|problem, data| {
         let names = ["turn", "lift", "bend", "roll", "pitch"];
@@ -306,7 +306,11 @@ fn what_may_have_been_misread_is_said() {
         let rows = data.measurements.configurations.chunks_exact_mut(5);
         rows.for_each(|q| q.copy_from_slice(&[q[2], q[1], q[4], q[3], q[0]]));
     });
-    assert_eq!(sorted, [Misreading::Alphabetical.to_string()]);
+    assert_eq!(
+        sorted,
+        ["columns of all joints in the alphabetical order of the joints' names (as in ROS \
+         joint_states; name the columns after the joints)"]
+    );
     // Rows P0, P1, P10, P11, … of one table beside rows P0, P1, P2, … of the other.
     let mut numbers: Vec<usize> = (0..90).collect();
     numbers.sort_by_key(usize::to_string);
@@ -314,21 +318,26 @@ fn what_may_have_been_misread_is_said() {
         let positions = &data.measurements.positions;
         data.measurements.positions = numbers.iter().map(|&row| positions[row]).collect();
     });
-    let text_order = |is_of_joints| Misreading::TextOrder { first: 0, is_of_joints }.to_string();
-    assert_eq!(by_text, [text_order(false)]);
+    let text_order = |what: &str| {
+        format!(
+            "{what} whose rows are sorted by the text of their numbers (1, 10, 11, …, 2; join the \
+             tables by name or number, not by order)"
+        )
+    };
+    assert_eq!(by_text, [text_order("positions")]);
     let of_joints = with(&|_, data| {
         let rows = &data.measurements.configurations;
         let sorted = numbers.iter().flat_map(|&row| rows[5 * row..5 * row + 5].to_vec());
         data.measurements.configurations = sorted.collect();
     });
-    assert_eq!(of_joints, [text_order(true)]);
+    assert_eq!(of_joints, [text_order("joint angles")]);
     // A free tool moves to its true position, far beyond its prior.
     let held = arm("'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'base.*' = { free = true }");
     let far = with(&|problem, _| {
         *problem = held.clone();
         problem.tool.target *= 1e3;
     });
-    assert_eq!(far, [Misreading::TargetInMillimetres.to_string()]);
+    assert_eq!(far, ["a target of [tool] that is in millimetres, declared in metres"]);
     // Lengths of the arm in millimetres: angles read as another unit explain the data no better.
     let long = |problem: &mut Problem, data: &mut Dataset, unit: f64| {
         problem.joints[2].a *= 1e3;
@@ -338,27 +347,33 @@ fn what_may_have_been_misread_is_said() {
     for unit in [degree, 1.0] {
         assert_eq!(
             with(&|problem, data| long(problem, data, unit)),
-            [Misreading::ArmInMillimetres.to_string()]
+            ["lengths of joints that are in millimetres, declared in metres"]
         );
     }
     let all = with(&|problem, _| {
         let lengths = problem.joints.iter_mut().flat_map(|joint| [&mut joint.a, &mut joint.d]);
         lengths.chain(&mut problem.tool.target).for_each(|length| *length *= 1e3);
     });
-    assert_eq!(all, [Misreading::ArmInMillimetres.to_string()]);
+    assert_eq!(all, ["lengths of joints that are in millimetres, declared in metres"]);
     // Columns with a declared unit are not suspected of another one.
     let impossible = with(&|problem, data| {
         scaled(1.0 / degree)(problem, data);
         long(&mut problem.clone(), data, degree);
     });
-    assert!(!impossible.contains(&Misreading::Degrees.to_string()), "{impossible:?}");
+    assert!(
+        !impossible.contains(&"joint angles that are degrees, declared as radians".to_owned()),
+        "{impossible:?}"
+    );
     let metres = with(&|problem, data| {
         sized(1e-3)(problem, data);
         data.measurements.position_unit = Some(1.0);
     });
-    assert!(!metres.contains(&Misreading::Metres.to_string()), "{metres:?}");
+    assert!(
+        !metres.contains(&"positions that are metres, declared as millimetres".to_owned()),
+        "{metres:?}"
+    );
     let backwards = with(&|_, data| data.measurements.positions.reverse());
-    assert_eq!(backwards, [Misreading::ReversedRows.to_string()]);
+    assert_eq!(backwards, ["positions in the opposite order of the rows"]);
     // No misreading explains shuffled rows.
     let shuffled = with(&|_, data| {
         let positions = &data.measurements.positions;
@@ -366,7 +381,7 @@ fn what_may_have_been_misread_is_said() {
     });
     assert!(shuffled.is_empty(), "{shuffled:?}");
     let shifted = with(&|_, data| data.measurements.positions.rotate_left(1));
-    assert_eq!(shifted, [Misreading::Shifted { by: -1, from: 0 }.to_string()]);
+    assert_eq!(shifted, ["positions that belong to the configuration 1 row after"]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Fits that the data refute are not passed on: bounds along unidentifiable directions, priors and
 //! noise that the data contradict, held-out rows, orientations, planar arms, and reversed joints.
 
-use flexcal::fit::{FindingCode, Misreading, Options, identify};
+use flexcal::fit::{FindingCode, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::model::PoseResiduals;
 use flexcal::problem::{Effect, Problem};
@@ -158,8 +158,8 @@ fn every_reversed_joint_is_named() {
     }
     let found = fit(&problem, &data);
     let misread = found.finding(FindingCode::Misread).unwrap();
-    let words = Misreading::reversed(&reversed).to_string();
-    assert!(misread.to_string().contains(&words), "{misread}");
+    let words = "joints 1, 2 and 4 that count the other way";
+    assert!(misread.to_string().contains(words), "{misread}");
 }
 
 #[test]

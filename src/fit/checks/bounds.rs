@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
-use super::row_kind::listed;
+use super::row_kind::listed_up_to;
 use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
 use crate::least_squares::solver::AtBound;
 
@@ -29,7 +29,7 @@ pub(super) fn bounds_are_seen(fit: &CheckedFit) -> Vec<Finding> {
         let mut order = partners.clone();
         order.sort_by(|&a, &b| direction[b].abs().total_cmp(&direction[a].abs()));
         names.extend(order.iter().map(|&k| parameters[k].name.as_str()));
-        let first = listed(&names, MAX_NAMED_PARTNERS);
+        let first = listed_up_to(&names, MAX_NAMED_PARTNERS);
         let text = format!(
             "{name} rests on its {side} bound; the data hardly determine more than one \
              combination of it with {first}, and standard errors allow for all values of \

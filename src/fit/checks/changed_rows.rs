@@ -44,8 +44,6 @@ const MIN_NOISE_PROBABILITY: f64 = 1e-3;
 /// Largest share of the misfit beyond the declared noise that two places of a target leave. A choice of
 /// rows explains much of any misfit.
 const MAX_LEFT_BY_TARGETS: f64 = 0.02;
-/// Largest number of rows that a text lists.
-const MAX_LISTED: usize = 3;
 /// Largest share of the changed rows on the wrong side of a limit of a column that tells them from the
 /// others.
 const MAX_MIXED_SHARE: f64 = 0.1;
@@ -103,7 +101,7 @@ fn zero_field(problem: &Problem, joint: usize) -> Option<JointField> {
 /// In `images`, a change begins with an image, and that of the whole arm is not tried.
 fn changed(fit: &CheckedFit, images: bool) -> Option<Finding> {
     let stage = fit.whole;
-    let rows = &fit.fitting.split.identification;
+    let rows = fit.rows();
     let unknowns: Vec<&Parameter> = stage.parameters().collect();
     if rows.len() > MAX_SIZE[0] || unknowns.len() > MAX_SIZE[1] || rows.len() < 2 * MIN_ROWS {
         return None;
@@ -197,8 +195,8 @@ fn two_changes(
 
 /// Returns a change with the words for its rows, from a row of the order on, and the first of them.
 fn of_order(fit: &CheckedFit, order: &[usize], step: Step) -> (String, String, Step) {
-    let row = fit.fitting.split.identification[order[step.first]];
-    let location = fit.fitting.measurements.location(row).to_string();
+    let row = fit.rows()[order[step.first]];
+    let location = fit.table().location(row).to_string();
     let rows = format!("from {location} on ({} of {} rows)", order.len() - step.first, order.len());
     (rows, location, step)
 }
@@ -211,22 +209,18 @@ fn mixed_targets(fit: &CheckedFit, linear: &Linear, places: &Places) -> Option<F
         let (rows, change, cost) = linear.two_values(columns)?;
         let step = Step { place, first: 0, cost, change, columns: columns.len() };
         // Chance chooses from all divisions of the rows.
-        let tries = 2_f64.powi(i32::try_from(fit.fitting.split.identification.len()).ok()?);
+        let tries = 2_f64.powi(i32::try_from(fit.rows().len()).ok()?);
         let left = (step.cost - freedom_of(linear, &step)).max(0.0);
         let is_clear = left <= MAX_LEFT_BY_TARGETS * (linear.cost - linear.freedom);
         let is_sure = is_clear && is_beyond_chance(linear, &step, tries);
         if !is_sure || is_told_by_column(fit, &rows) {
             return None;
         }
-        let identification = &fit.fitting.split.identification;
-        let location = |&row: &usize| fit.fitting.measurements.location(identification[row]);
+        let identification = fit.rows();
+        let location = |&row: &usize| fit.table().location(identification[row]);
         let shown: Vec<String> = rows.iter().map(|row| location(row).to_string()).collect();
-        let place = format!(
-            "in {} ({} of {} rows)",
-            listed(&shown, MAX_LISTED),
-            rows.len(),
-            identification.len()
-        );
+        let place =
+            format!("in {} ({} of {} rows)", listed(&shown), rows.len(), identification.len());
         finding(fit, linear, places, &[(place, shown[0].clone(), step)])
     })
 }
@@ -234,7 +228,7 @@ fn mixed_targets(fit: &CheckedFit, linear: &Linear, places: &Places) -> Option<F
 /// Returns true if a column of the table tells nearly all of these rows from the others by a limit of
 /// its values.
 fn is_told_by_column(fit: &CheckedFit, rows: &[usize]) -> bool {
-    let count = fit.fitting.split.identification.len();
+    let count = fit.rows().len();
     let order: Vec<usize> = (0..count).collect();
     let tells = |values: Vec<f64>| {
         let mut sorted = order.clone();
@@ -253,8 +247,8 @@ fn is_told_by_column(fit: &CheckedFit, rows: &[usize]) -> bool {
 /// Returns the rows of an order in groups between which a change may begin: each image, or each row
 /// of other tables.
 fn groups(fit: &CheckedFit, order: &[usize], images: bool) -> Vec<Vec<usize>> {
-    let numbers = fit.fitting.measurements.arm_pose_numbers(fit.problem);
-    let pose = |place: usize| numbers[fit.fitting.split.identification[place]];
+    let numbers = fit.table().arm_pose_numbers(fit.problem);
+    let pose = |place: usize| numbers[fit.rows()[place]];
     let together = |a: &usize, b: &usize| images && pose(*a) == pose(*b);
     order.chunk_by(together).map(<[usize]>::to_vec).collect()
 }
@@ -290,9 +284,8 @@ fn freedom_of(linear: &Linear, step: &Step) -> f64 {
 /// target in the frame of the base. The place is predicted, so that a moved instrument does not
 /// change it.
 fn other_columns(fit: &CheckedFit, order: &[usize]) -> Vec<Vec<f64>> {
-    let table = fit.fitting.measurements;
-    let rows: Vec<usize> =
-        order.iter().map(|&place| fit.fitting.split.identification[place]).collect();
+    let table = fit.table();
+    let rows: Vec<usize> = order.iter().map(|&place| fit.rows()[place]).collect();
     let in_rows = |value: &dyn Fn(usize) -> f64| rows.iter().map(|&row| value(row)).collect();
     let joints = table.joints;
     let mut columns: Vec<Vec<f64>> =
@@ -304,10 +297,8 @@ fn other_columns(fit: &CheckedFit, order: &[usize]) -> Vec<Vec<f64>> {
     columns.extend(optional.map(|of| in_rows(&|row| of[row])));
     let covariates = rows.first().map_or(0, |&row| table.covariates_of(row).len());
     columns.extend((0..covariates).map(|k| in_rows(&|row| table.covariates_of(row)[k])));
-    let targets = fit
-        .fitting
-        .model
-        .predicted_targets_in_base(&fit.fitting.poses(&rows), fit.end.x.as_slice());
+    let targets =
+        fit.model().predicted_targets_in_base(&fit.fitting.poses(&rows), fit.end.x.as_slice());
     let along =
         |axis: usize| targets.iter().map(move |at| at.map_or(f64::NAN, |at| at[axis])).collect();
     columns.extend((0..3).map(along));

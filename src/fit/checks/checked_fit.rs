@@ -24,6 +24,7 @@ use crate::fit::uncertainty::statistics::Statistics;
 use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
+use crate::numeric::root_mean;
 use crate::problem::{JointKind, Observation, Problem};
 
 /// Maximum number of solver steps of a further fit with another problem.
@@ -89,10 +90,30 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub explanations: OnceCell<Explanations>,
 }
 
-impl CheckedFit<'_> {
+impl<'a> CheckedFit<'a> {
     /// Returns true if the strategy fits a rigid arm although the problem declares elasticity.
     pub fn ignores_elasticity(&self) -> bool {
         self.fitting.strategy == Strategy::Rigid && self.problem.is_elastic()
+    }
+
+    /// Returns the table of measurements.
+    pub fn table(&self) -> &'a Measurements {
+        self.fitting.measurements
+    }
+
+    /// Returns the identification rows.
+    pub fn rows(&self) -> &'a [usize] {
+        &self.fitting.split.identification
+    }
+
+    /// Returns the model of the arm.
+    pub fn model(&self) -> &'a Model {
+        self.fitting.model
+    }
+
+    /// Returns the errors measured − predicted of some rows with the full parameter vector `x`.
+    pub fn errors_at(&self, rows: &[usize], x: &DVector<f64>) -> Vec<Vector3<f64>> {
+        self.fitting.position_errors(rows, x)
     }
 
     /// Returns the identification rows grouped by their kind, positions first; rows that do not
@@ -159,7 +180,7 @@ impl CheckedFit<'_> {
         let is_joint = self.fitting.strategy == Strategy::Joint;
         let refit = || {
             self.with_strategy(Strategy::Joint, self.problem, |fitting| {
-                let end = fitting.run(&fitting.registered().ok()?).ok()?;
+                let end = fitting.refitted()?;
                 Some(self.rms(&kind.rows, &fitting.position_errors(&kind.rows, &end.x)))
             })
         };
@@ -190,6 +211,15 @@ impl CheckedFit<'_> {
             linear_model: None,
             ..self.fitting.with_declared_noise()
         }))
+    }
+
+    /// Returns true if further fits may show which declaration causes that the measurements contradict
+    /// the declared σ.
+    pub fn contradicts_noise(&self) -> bool {
+        self.noise == Noise::Declared
+            && self.noise_factor > 1.0
+            && self.has_further_fits
+            && self.fitting.earlier.is_none()
     }
 
     /// Returns true if the joint at index `joint` takes an angle as its command.
@@ -239,12 +269,11 @@ impl CheckedFit<'_> {
         let is_robust = self.fitting.loss != Loss::Squares;
         let is_set_aside =
             |row: usize| is_robust && self.outliers.iter().any(|outlier| outlier.row == row);
-        let kept: Vec<f64> = rows
+        let kept = rows
             .iter()
             .zip(errors)
             .filter(|(row, _)| !is_set_aside(**row))
-            .map(|(_, error)| error.norm_squared())
-            .collect();
-        (kept.iter().sum::<f64>() / kept.len().max(1) as f64).sqrt()
+            .map(|(_, error)| error.norm_squared());
+        root_mean(kept)
     }
 }

@@ -58,11 +58,11 @@ const MIN_VARIANT_ERROR: f64 = 0.03;
 
 /// Returns the remedy for lengths that are all `factor` times the declared ones.
 fn remedy(fit: &CheckedFit, factor: f64) -> String {
-    let leading = fit.fitting.measurements.leading();
+    let leading = fit.table().leading();
     let arm = "or the lengths of the joint table and their priors";
     if leading.kind() == Observation::Pixel(0, 0, 0).kind() {
         let marker = leading.fixtures()[1];
-        let print = marker.and_then(|marker| spacing(fit.fitting.model.marker_points(marker)));
+        let print = marker.and_then(|marker| spacing(fit.model().marker_points(marker)));
         let print = print.map_or_else(String::new, |spacing| {
             format!(
                 " (measure the print: points 0 and 1 are declared {:.3} mm apart, the declared \
@@ -132,7 +132,7 @@ struct CommonFactor {
 impl CommonFactor {
     /// Estimates the factor; `None` with fewer than two lengths that the data determine.
     fn of(fit: &CheckedFit) -> Option<Self> {
-        let parameters = &fit.fitting.model.parameters;
+        let parameters = &fit.model().parameters;
         let later = &fit.fitting.held_out_only.parameters;
         let is_length = |parameter: &Parameter| {
             matches!(parameter.site, ParameterSite::Joint { field, .. } if field.is_geometry())

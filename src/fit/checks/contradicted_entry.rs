@@ -57,7 +57,7 @@ pub(super) fn exchanged_targets<'a>(fit: &CheckedFit<'a>) -> Option<[&'a str; 2]
         let mut declared = fit.problem.targets.iter();
         let declared = declared.find(|declared| declared.name == names[target])?;
         let mut place = declared.at;
-        for (parameter, x) in fit.fitting.model.parameters.iter().zip(&fit.end.x) {
+        for (parameter, x) in fit.model().parameters.iter().zip(&fit.end.x) {
             match parameter.site {
                 ParameterSite::Target { target: of, axis } if of == target && axis < 3 => {
                     place[axis] += x;
@@ -88,7 +88,7 @@ pub(super) fn exchanged_targets<'a>(fit: &CheckedFit<'a>) -> Option<[&'a str; 2]
 /// Returns the declared target if a fit without its prior explains the measurements and leaves all
 /// other parameters within their priors.
 fn freed_target(fit: &CheckedFit) -> Option<ContradictedEntry> {
-    let kind = fit.fitting.measurements.leading();
+    let kind = fit.table().leading();
     if !kind.is_position() {
         return None;
     }
@@ -109,7 +109,7 @@ fn single_entry(
     let rms = fit.rms_at(&kind.rows, &fit.end.x);
     let displacement = match parameter.unit() {
         Unit::Length => x.abs(),
-        Unit::Angle => x.abs() * fit.fitting.model.reach(),
+        Unit::Angle => x.abs() * fit.model().reach(),
         _ => return None,
     };
     if !kind.observation.is_position() || rms > MAX_REMAINING_FRACTION * displacement {
@@ -123,7 +123,7 @@ fn single_entry(
         ) => target == other && (axis < 3) == (of_other < 3),
         (site, other) => site == other,
     };
-    let fitted = || fit.fitting.model.parameters.iter().zip(&fit.end.x);
+    let fitted = || fit.model().parameters.iter().zip(&fit.end.x);
     if fitted().any(|(other, x)| !is_same(other.site) && is_far(other, *x)) {
         return None;
     }

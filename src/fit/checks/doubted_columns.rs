@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::checked_fit::CheckedFit;
 use super::contradicted_entry::rounded;
 use super::finding::{Finding, FindingCode};
-use super::followed_commands::{Neighbour, Relation, Unrelated, unrelated};
+use super::followed_commands::{Unrelated, unrelated};
 use super::misfit::misfit;
 use super::row_kind::{AXES, format_error};
 use super::row_relation::{OtherRows, other_rows};
@@ -33,16 +33,15 @@ const MAX_RATIO: f64 = 0.2;
 /// rows before fit, that no column rises by the same step from a row on, that the positions follow
 /// each joint column, and that no coordinate is sorted by itself.
 pub(super) fn columns_hold_measurements(fit: &CheckedFit) -> Option<Finding> {
-    let positions = fit.fitting.measurements.leading().is_position();
+    let positions = fit.table().leading().is_position();
     let missed = misfit(fit).into_iter().next();
     let before = missed.filter(|_| positions).and_then(|found| found.number("rms"))?;
-    let found = repeated_coordinate(fit, before)
+    repeated_coordinate(fit, before)
         .or_else(|| filled_or_frozen(fit, before))
         .or_else(|| unrelated_to_positions(fit, before))
         .or_else(|| standing_still(fit, before))
         .or_else(|| sorted_by_itself(fit, before))
-        .or_else(|| of_other_rows(fit, before));
-    found
+        .or_else(|| of_other_rows(fit, before))
 }
 
 /// Returns the name of the column of a joint.
@@ -55,7 +54,7 @@ pub(super) fn column_name(rows: &Measurements, joint: usize) -> String {
 pub(super) fn moving<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f {
     let joints = fit.problem.joints.iter().enumerate();
     let moving = joints.filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
-    moving.map(|(joint, _)| joint).filter(|joint| *joint < fit.fitting.measurements.joints)
+    moving.map(|(joint, _)| joint).filter(|joint| *joint < fit.table().joints)
 }
 
 /// Returns the commands of a joint in all rows.
@@ -65,7 +64,7 @@ fn commands(rows: &Measurements, joint: usize) -> Vec<f64> {
 
 /// Returns those of the `joints` whose commands stay within 0.1° or 0.1 mm in the `rows`.
 pub(super) fn still_joints(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -> Vec<usize> {
-    let table = fit.fitting.measurements;
+    let table = fit.table();
     let is_still = |joint: &usize| {
         let (least, most) =
             crate::numeric::range(rows.iter().map(|&row| table.configuration(row)[*joint]));
@@ -77,7 +76,7 @@ pub(super) fn still_joints(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -
 
 /// Reports joints that stand still in all rows.
 fn standing_still(fit: &CheckedFit, before: f64) -> Option<Finding> {
-    let rows = fit.fitting.measurements;
+    let rows = fit.table();
     let every_row: Vec<usize> = (0..rows.len()).collect();
     let still = still_joints(fit, &every_row, &moving(fit).collect::<Vec<_>>());
     if still.is_empty() || rows.len() < MIN_ROWS {
@@ -97,7 +96,7 @@ fn standing_still(fit: &CheckedFit, before: f64) -> Option<Finding> {
 /// Reports a column that keeps its value, or rises by the same step, from a row to the end of the
 /// table, if the rows before that fit far better by themselves.
 fn filled_or_frozen(fit: &CheckedFit, before: f64) -> Option<Finding> {
-    let rows = fit.fitting.measurements;
+    let rows = fit.table();
     moving(fit).find_map(|joint| {
         let values = commands(rows, joint);
         let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -142,41 +141,8 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
         return None;
     }
     let joints: Vec<usize> = moving(fit).collect();
-    let Unrelated { joint, after, relation } = unrelated(fit, before, &joints)?;
-    let rows = fit.fitting.measurements;
-    let name = column_name(rows, joint);
-    let what = match relation {
-        None => "the column may hold a speed, a deviation or another axis".to_owned(),
-        Some(Relation::LostSign) => {
-            "the sign of its numbers is lost, none of which is negative".to_owned()
-        }
-        Some(Relation::ReversedFrom(row)) => {
-            format!("from about {} on, the column counts the other way", rows.location(row))
-        }
-        Some(Relation::Reversed) => "some of its numbers have the other sign".to_owned(),
-        Some(Relation::HalfTurns) => {
-            "some of its numbers are half a turn off, as angles that were wrapped to 180°"
-                .to_owned()
-        }
-        Some(Relation::OfNeighbour(Neighbour::Before)) => {
-            "each of its numbers belongs to the row before".to_owned()
-        }
-        Some(Relation::OfNeighbour(Neighbour::After)) => {
-            "each of its numbers belongs to the row after".to_owned()
-        }
-        Some(Relation::Held(run)) => {
-            format!("it holds one number {}, as if the log had frozen", in_rows(rows, run))
-        }
-        Some(Relation::Offset(run, by)) => {
-            let size = if by > 0.0 { "small" } else { "large" };
-            let by = by.abs().to_degrees();
-            format!("{} its numbers are too {size} by {by:.0}°", in_rows(rows, run))
-        }
-    };
-    let with = match relation {
-        Some(Relation::OfNeighbour(_)) => "its numbers moved by a row".to_owned(),
-        _ => format!("joint {} found from each position", joint + 1),
-    };
+    let Unrelated { joint, after, with, what } = unrelated(fit, before, &joints)?;
+    let name = column_name(fit.table(), joint);
     let text = format!(
         "the positions do not follow the column {name}: with {with}, the nominal arm misses by {} \
          instead of {}; {what}",
@@ -184,11 +150,6 @@ fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
         format_error("position", fit.registered.identification.rms.norm, 1)
     );
     Some(finding(&[name], before, Some(after), text))
-}
-
-/// Returns the words for rows from the first to the last.
-fn in_rows(rows: &Measurements, [first, last]: [usize; 2]) -> String {
-    format!("in the rows from {} to {}", rows.location(first), rows.location(last))
 }
 
 /// Returns true if values rise, or fall, from the first to the last.
@@ -202,7 +163,7 @@ fn is_sorted(values: &[f64]) -> bool {
 /// plane, or two coordinates that are equal in all rows.
 fn repeated_coordinate(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let kind = fit.leading();
-    let points = &fit.fitting.measurements.positions;
+    let points = &fit.table().positions;
     let (first, n) = (points[*kind.rows.first()?], kind.rows.len());
     let is_in_all =
         |holds: &dyn Fn(&Vector3<f64>) -> bool| kind.rows.iter().all(|&row| holds(&points[row]));
@@ -213,7 +174,7 @@ fn repeated_coordinate(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let (names, what) = if let Some(axis) = (0..3).find(is_same) {
         let poses = fit.fitting.poses(&kind.rows);
         let nominal = fit.fitting.located();
-        let predicted = fit.fitting.model.predicted_targets(&poses, nominal.as_slice());
+        let predicted = fit.model().predicted_targets(&poses, nominal.as_slice());
         let centre = predicted.iter().sum::<Vector3<f64>>() / n as f64;
         let squares: Matrix3<f64> =
             predicted.iter().map(|at| (at - centre) * (at - centre).transpose()).sum();
@@ -240,7 +201,7 @@ fn repeated_coordinate(fit: &CheckedFit, before: f64) -> Option<Finding> {
 
 /// Reports a coordinate that rises or falls from row to row in the whole table while no other does.
 fn sorted_by_itself(fit: &CheckedFit, before: f64) -> Option<Finding> {
-    let rows = fit.fitting.measurements;
+    let rows = fit.table();
     let axis = |axis: usize| rows.positions.iter().map(|x| x[axis]).collect::<Vec<f64>>();
     let sorted: Vec<usize> = (0..3).filter(|&k| is_sorted(&axis(k))).collect();
     let &[only] = sorted.as_slice() else { return None };
@@ -265,7 +226,7 @@ fn of_other_rows(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let joints: Vec<usize> = moving(fit).collect();
     let OtherRows { joints: found, determination: [measured, predicted] } =
         other_rows(fit, &joints)?;
-    let rows = fit.fitting.measurements;
+    let rows = fit.table();
     let names: Vec<String> = found.iter().map(|&joint| column_name(rows, joint)).collect();
     let (text, remedy) = if names.len() == joints.len() {
         let text = format!(
@@ -299,11 +260,6 @@ fn finding(columns: &[String], before: f64, after: Option<f64>, text: String) ->
 /// Returns the error of the registered nominal arm in the identification rows before `row` \[m\];
 /// `None` if too few are left.
 fn error_before(fit: &CheckedFit, row: usize) -> Option<f64> {
-    let chosen: Vec<usize> =
-        fit.fitting.split.identification.iter().copied().filter(|&k| k < row).collect();
-    if chosen.len() < MIN_ROWS {
-        None
-    } else {
-        fit.registration_error(fit.fitting.measurements, &chosen)
-    }
+    let chosen: Vec<usize> = fit.rows().iter().copied().filter(|&k| k < row).collect();
+    if chosen.len() < MIN_ROWS { None } else { fit.registration_error(fit.table(), &chosen) }
 }

@@ -7,10 +7,10 @@ use serde_json::json;
 
 use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
-use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, misfit};
+use super::misfit::{misfit, unreported};
 use super::mistaken_rows::MistakenRows;
-use super::row_kind::{format_error, listed};
-use crate::numeric::median;
+use super::row_kind::{format_error, listed, listed_up_to};
+use crate::numeric::{median, root_mean};
 
 /// Number of successive rows of each base to which the nominal arm is registered in a trial. They
 /// determine base and tool.
@@ -21,9 +21,8 @@ const MAX_TRIALS: usize = 12;
 const MAX_RATIO: f64 = 0.2;
 /// Largest error of a row that fits, as a multiple of the rms error that is not reported as a misfit.
 const MAX_OF_RMS: f64 = 2.5;
-/// Maximum number of rows that the text lists, and of held-out ones.
+/// Maximum number of rows that the text lists.
 const MAX_LISTED: usize = 4;
-const MAX_HELD_OUT: usize = 3;
 /// Largest ratio of the error of a row that fits to the median error of all rows.
 const MAX_RATIO_TO_MEDIAN: f64 = 4.0;
 /// Smallest share of the rows that fit without the others if no mistake in the others is found. With
@@ -42,7 +41,7 @@ pub(super) fn is_open(found: &Finding) -> bool {
 
 /// Checks, if the fit is far off, that most rows do not fit the nominal arm without the others.
 pub(super) fn rows_belong_together(fit: &CheckedFit) -> Option<Finding> {
-    let positions = fit.fitting.measurements.leading().is_position();
+    let positions = fit.table().leading().is_position();
     let missed = misfit(fit).into_iter().next().filter(|_| positions);
     let before = missed.and_then(|found| found.number("rms"));
     before.and_then(|before| doubted(fit, before))
@@ -65,14 +64,13 @@ struct Trial {
 fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let kind = fit.leading();
     let rows = &kind.rows;
-    let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
-    let unreported = (MAX_MISS * kind.spread).max(noise);
+    let unreported = unreported(&kind);
     let limit = (MAX_RATIO * before).min(MAX_OF_RMS * unreported);
     let registered = |chosen: &[usize], is_first: bool| -> Option<Trial> {
         let chosen: Vec<usize> = chosen.iter().map(|&place| rows[place]).collect();
-        let table = fit.fitting.measurements;
+        let table = fit.table();
         let x = fit.with_rows(table, &chosen, |fitting| fitting.registered().ok())?;
-        let errors = fit.fitting.position_errors(rows, &x);
+        let errors = fit.errors_at(rows, &x);
         // Few wrong rows leave a small rms error, which the nominal arm may exceed in many rows.
         let usual = MAX_RATIO_TO_MEDIAN * median(errors.iter().map(nalgebra::Matrix::norm))?;
         let limit = if is_first { limit } else { limit.max(usual.min(before)) };
@@ -92,14 +90,14 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     }
     let apart: Vec<usize> = (0..rows.len()).filter(|row| !trial.near.contains(row)).collect();
     let squares = trial.near.iter().map(|&place| trial.errors[place].norm_squared());
-    let after = (squares.sum::<f64>() / trial.near.len().max(1) as f64).sqrt();
+    let after = root_mean(squares);
     let is_explained = after < unreported;
     let are_few = (trial.near.len() as f64) < MIN_SHARE * rows.len() as f64;
     let (&first, &last) = (apart.first()?, apart.last()?);
     if !is_explained || apart.len() < 2 {
         return None;
     }
-    let measurements = fit.fitting.measurements;
+    let measurements = fit.table();
     let place = |place: usize| measurements.location(rows[place]).to_string();
     let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
     let kept: Vec<usize> = trial.near.iter().map(|&place| rows[place]).collect();
@@ -114,18 +112,18 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         format!("the rows from {} to {}", place(first), place(last))
     } else {
         let places: Vec<String> = apart.iter().map(|&row| place(row)).collect();
-        format!("the rows {}", listed(&places, MAX_LISTED))
+        format!("the rows {}", listed_up_to(&places, MAX_LISTED))
     };
     let is_position = |row: &usize| measurements.observation(*row).is_position();
     let held_out: Vec<usize> =
         fit.fitting.split.held_out.iter().copied().filter(is_position).collect();
-    let errors = fit.fitting.position_errors(&held_out, &trial.x);
+    let errors = fit.errors_at(&held_out, &trial.x);
     let far = held_out.iter().zip(&errors).filter(|(_, of)| of.norm() > before.max(trial.limit));
     let far: Vec<String> = far.map(|(&row, _)| measurements.location(row).to_string()).collect();
     let far = if far.is_empty() {
         String::new()
     } else {
-        format!(", and {} of the held-out rows", listed(&far, MAX_HELD_OUT))
+        format!(", and {} of the held-out rows", listed(&far))
     };
     let text = format!(
         "{named} ({} of {}{far}) contradict the others: without them the nominal arm misses by {} instead of \

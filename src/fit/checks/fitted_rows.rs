@@ -7,13 +7,13 @@ use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode, OF_MISFIT};
 use super::outliers::{InfluentialRows, outliers_as_json};
 use super::point_spread::PointSpread;
-use super::row_kind::listed;
+use super::row_kind::{MAX_LISTED, listed};
 use crate::fit::Identification;
 use crate::problem::Observation;
 
 /// Checks that no identification row has a residual too large to be noise.
 pub(super) fn no_outliers(fit: &CheckedFit) -> Option<Finding> {
-    let (count, of) = (fit.outliers.len(), fit.fitting.split.identification.len());
+    let (count, of) = (fit.outliers.len(), fit.rows().len());
     if count == 0 {
         return None;
     }
@@ -25,8 +25,6 @@ pub(super) fn no_outliers(fit: &CheckedFit) -> Option<Finding> {
 
 /// Codes of findings that explain a misfit by another reading of the whole table.
 const READINGS: [FindingCode; 2] = [FindingCode::Misread, FindingCode::ColumnDoubted];
-/// Maximum number of influential rows that the reason for distrust names.
-const MAX_NAMED: usize = 3;
 
 impl Identification {
     /// Adds the finding about few rows that cause most of the misfit, and states these rows as its
@@ -56,20 +54,20 @@ impl Identification {
             let (cause, them) = if rows.len() == 1 { ("causes", "it") } else { ("cause", "them") };
             let remedy = format!(
                 "{} {cause} most of it: correct {them}, or leave {them} out",
-                listed(&places, MAX_NAMED)
+                listed(&places)
             );
             // That finding says also what is wrong in the rows.
             let has_doubted_rows =
                 findings.iter().any(|finding| finding.code == FindingCode::RowsDoubted);
             // Another reading of the whole table explains many rows better.
             let has_readings = |finding: &Finding| {
-                rows.len() > MAX_NAMED
+                rows.len() > MAX_LISTED
                     && finding.value("explanations").is_some_and(|of| of != &json!([]))
             };
             let is_read_otherwise = findings.iter().any(has_readings);
             for finding in &mut findings {
                 if OF_MISFIT.contains(&finding.code) && !has_doubted_rows && !is_read_otherwise {
-                    finding.remedy = remedy.clone();
+                    finding.remedy.clone_from(&remedy);
                 }
             }
             if !findings.iter().any(|finding| finding.code == FindingCode::Misread) {

@@ -6,9 +6,10 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Vector3;
 
 use super::checked_fit::CheckedFit;
-use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL};
+use super::misfit::unreported;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::Measurements;
+use crate::numeric::{root_mean, spaced};
 
 /// Maximum number of rows, evenly spaced, with which the search is made.
 const MAX_ROWS: usize = 60;
@@ -36,34 +37,10 @@ pub(super) struct Unrelated {
     /// Error of the registered nominal arm with the coordinate found from each position, or taken from
     /// the row beside \[m\].
     pub after: f64,
-    /// Relation of the found coordinates to those of the column; `None` if none is seen.
-    pub relation: Option<Relation>,
-}
-
-/// Relation of the true coordinates of a joint to those of its column.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Relation {
-    /// Some coordinates have the other sign; the column has no negative number.
-    LostSign,
-    /// Coordinates from this row on have the other sign.
-    ReversedFrom(usize),
-    /// Some coordinates have the other sign.
-    Reversed,
-    /// The found joint angle differs from the column by half a turn in some rows.
-    HalfTurns,
-    /// Each number belongs to the row before, or to the row after.
-    OfNeighbour(Neighbour),
-    /// The column holds one number in these rows, unlike the joint.
-    Held([usize; 2]),
-    /// Coordinates in these rows are larger by this angle \[rad\].
-    Offset([usize; 2], f64),
-}
-
-/// Row beside another one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Neighbour {
-    Before,
-    After,
+    /// How the coordinate was found.
+    pub with: String,
+    /// What is wrong with the column.
+    pub what: String,
 }
 
 /// Largest difference of a found coordinate from one that the column explains \[rad\].
@@ -86,26 +63,29 @@ fn is_near(angle: f64) -> bool {
 /// Minimum number of rows in which a column holds one number.
 const MIN_HELD: usize = 4;
 
-/// Returns the relation of the coordinates of a turning joint that were `found` in some rows to the
-/// numbers of its `column` in all rows \[rad\]. Each row is given with its number and the found
-/// coordinate.
-fn relation(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
+/// Returns how the numbers of a `column` in all rows of a `table` \[rad\] differ from the coordinates
+/// of its turning joint that were `found` in some rows, in words. Each row is given with its index, its
+/// number and the found coordinate.
+fn relation(table: &Measurements, found: &[(usize, f64, f64)], column: &[f64]) -> Option<String> {
     // The angle by which most differences agree.
     let from_own: Vec<f64> = found.iter().map(|of| of.2 - of.1).collect();
     let near = |angle: &&f64| from_own.iter().filter(|other| is_near(*other - **angle)).count();
     let zero = from_own.iter().max_by_key(near).map_or(0.0, |angle| wrapped(*angle));
-    related(found, column).or_else(|| {
+    related(table, found, column).or_else(|| {
         // The pose of the base may make up for an angle that all coordinates have in common.
         let aligned: Vec<(usize, f64, f64)> = found
             .iter()
             .map(|&(row, command, coordinate)| (row, command, coordinate - zero))
             .collect();
-        related(&aligned, column)
+        related(table, &aligned, column)
     })
 }
 
 /// Does the work of [`relation`] for numbers of their own rows.
-fn related(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
+fn related(table: &Measurements, found: &[(usize, f64, f64)], column: &[f64]) -> Option<String> {
+    let in_rows = |first: usize, last: usize| {
+        format!("in the rows from {} to {}", table.location(first), table.location(last))
+    };
     let count = found.len() as f64;
     let is_same = |&(_, command, coordinate): &(usize, f64, f64)| is_near(coordinate - command);
     let explains = |is_changed: &dyn Fn(&(usize, f64, f64)) -> bool| {
@@ -121,13 +101,17 @@ fn related(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
     };
     if let Some(reversed) = explains(&|(_, command, coordinate)| is_near(coordinate + command)) {
         if found.iter().all(|(_, command, _)| *command >= 0.0) {
-            return Some(Relation::LostSign);
+            return Some("the sign of its numbers is lost, none of which is negative".to_owned());
         }
         let (&first, &last) = (reversed.first()?, found.last().map(|(row, ..)| row)?);
         let kept =
             found.iter().filter(|of| of.0 >= first && is_same(of) && of.1.abs() > MAX_DIFFERENCE);
         let is_run = reversed.contains(&last) && kept.count() == 0;
-        return Some(if is_run { Relation::ReversedFrom(first) } else { Relation::Reversed });
+        return Some(if is_run {
+            format!("from about {} on, the column counts the other way", table.location(first))
+        } else {
+            "some of its numbers have the other sign".to_owned()
+        });
     }
     // The longest run of equal numbers, in which the coordinates are others.
     let runs = column.chunk_by(|one, next| one.total_cmp(next).is_eq()).map(<[f64]>::len);
@@ -139,7 +123,8 @@ fn related(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
     if let Some(run) = longest
         && explains(&|(row, ..)| run.contains(row)).is_some()
     {
-        return Some(Relation::Held([run.start, run.end - 1]));
+        let rows = in_rows(run.start, run.end - 1);
+        return Some(format!("it holds one number {rows}, as if the log had frozen"));
     }
     // Each row that differs proposes the angle by which all of them do.
     let changed = || found.iter().filter(|of| !is_same(of));
@@ -149,9 +134,14 @@ fn related(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
     let rows = explains(&|(_, command, coordinate)| is_near(coordinate - command - offset))?;
     let (&first, &last) = (rows.first()?, rows.last()?);
     if !found.iter().any(|of| (first..=last).contains(&of.0) && is_same(of)) {
-        return Some(Relation::Offset([first, last], offset));
+        let size = if offset > 0.0 { "small" } else { "large" };
+        let by = offset.abs().to_degrees();
+        let rows = in_rows(first, last);
+        return Some(format!("{rows} its numbers are too {size} by {by:.0}°"));
     }
-    is_near(offset - PI).then_some(Relation::HalfTurns)
+    is_near(offset - PI).then(|| {
+        "some of its numbers are half a turn off, as angles that were wrapped to 180°".to_owned()
+    })
 }
 
 /// Returns the only joint whose column does not hold its coordinate, if the positions fit with that
@@ -159,13 +149,11 @@ fn related(found: &[(usize, f64, f64)], column: &[f64]) -> Option<Relation> {
 /// the indices of the joints with commands. The search is local, so it can miss such a column.
 pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Option<Unrelated> {
     let kind = fit.leading();
-    let step = kind.rows.len().div_ceil(MAX_ROWS).max(1);
-    let rows: Vec<usize> = kind.rows.iter().copied().step_by(step).collect();
+    let rows = spaced(kind.rows.clone(), MAX_ROWS);
     if rows.len() < MIN_ROWS {
         return None;
     }
-    let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
-    let limit = (MAX_RATIO * before).min((MAX_MISS * kind.spread).max(noise));
+    let limit = (MAX_RATIO * before).min(unreported(&kind));
     if let Some(late) = of_neighbour(fit, &rows, joints).filter(|late| late.after < limit) {
         return Some(late);
     }
@@ -177,23 +165,29 @@ pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Opti
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let &(joint, after, ref found) = errors.first()?;
     let is_alone = errors.get(1).is_none_or(|next| after < MAX_RATIO_TO_OTHERS * next.1);
-    let command = |row: usize| fit.fitting.measurements.configuration(row)[joint];
+    let command = |row: usize| fit.table().configuration(row)[joint];
     let pairs = rows.iter().zip(found).map(|(&row, &coordinate)| (row, command(row), coordinate));
-    let column: Vec<f64> = (0..fit.fitting.measurements.len()).map(command).collect();
+    let column: Vec<f64> = (0..fit.table().len()).map(command).collect();
     let is_turning = fit.turns(joint);
-    (after < limit && is_alone).then(|| Unrelated {
-        joint,
-        after,
-        relation: relation(&pairs.collect::<Vec<_>>(), &column).filter(|_| is_turning),
+    (after < limit && is_alone).then(|| {
+        let table = fit.table();
+        let what = relation(table, &pairs.collect::<Vec<_>>(), &column).filter(|_| is_turning);
+        Unrelated {
+            joint,
+            after,
+            with: format!("joint {} found from each position", joint + 1),
+            what: what.unwrap_or_else(|| {
+                "the column may hold a speed, a deviation or another axis".to_owned()
+            }),
+        }
     })
 }
 
 /// Returns the column of which each number belongs to the row before, or after, with the smallest
 /// error of the registered nominal arm.
 fn of_neighbour(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -> Option<Unrelated> {
-    let table = fit.fitting.measurements;
-    let moved = |&(joint, neighbour): &(usize, Neighbour)| {
-        let by = if neighbour == Neighbour::Before { 1 } else { -1 };
+    let table = fit.table();
+    let moved = |&(joint, by, side): &(usize, isize, &str)| {
         let source = |row: usize| row.checked_add_signed(by).filter(|row| *row < table.len());
         let pairs = rows.iter().filter_map(|&row| {
             let coordinate = table.configuration(source(row)?)[joint];
@@ -202,15 +196,15 @@ fn of_neighbour(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -> Option<Un
         let (rows, coordinates): (Vec<usize>, Vec<f64>) = pairs.unzip();
         let mut corrected = table.clone();
         set(&mut corrected, &rows, (joint, &coordinates));
-        let after = fit.registration_error(&corrected, &rows)?;
-        Some(Unrelated { joint, after, relation: Some(Relation::OfNeighbour(neighbour)) })
+        Some(Unrelated {
+            joint,
+            after: fit.registration_error(&corrected, &rows)?,
+            with: "its numbers moved by a row".to_owned(),
+            what: format!("each of its numbers belongs to the row {side}"),
+        })
     };
-    let columns: Vec<(usize, Neighbour)> = joints
-        .iter()
-        .flat_map(|&joint| [Neighbour::Before, Neighbour::After].map(|of| (joint, of)))
-        .collect();
-    let moved = columns.iter().filter_map(moved);
-    moved.min_by(|a, b| a.after.total_cmp(&b.after))
+    let columns = joints.iter().flat_map(|&joint| [(joint, 1, "before"), (joint, -1, "after")]);
+    columns.filter_map(|of| moved(&of)).min_by(|a, b| a.after.total_cmp(&b.after))
 }
 
 /// Returns the rms error of the registered nominal arm in `rows` with the coordinates of a joint
@@ -259,8 +253,7 @@ fn error_without(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<(f64,
                 *found -= error.dot(&slope) / slope.norm_squared().max(f64::MIN_POSITIVE);
             }
         }
-        let squares = errors_at(&found);
-        last = (squares.iter().map(Vector3::norm_squared).sum::<f64>() / rows.len() as f64).sqrt();
+        last = root_mean(errors_at(&found).iter().map(Vector3::norm_squared));
     }
     last.is_finite().then_some((last, found))
 }

@@ -5,6 +5,9 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 use crate::fit::{Identification, IdentifyError};
 use crate::problem::{ParameterRule, Problem};
 
+/// Largest p-value of the F test at which free parameters improve a fit significantly.
+pub(super) const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
+
 /// Fit of a problem with some held parameters free.
 pub(super) struct Freed {
     pub problem: Problem,

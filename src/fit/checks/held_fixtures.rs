@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::finding::{Finding, FindingCode};
-use super::freed::Freed;
+use super::freed::{Freed, MAX_CHANCE_PROBABILITY};
 use super::row_kind::format_error;
 use crate::fit::{Estimate, Identification, IdentifyError};
 use crate::measurement::Measurements;
@@ -14,8 +14,6 @@ use crate::quantity::format::{decimals, number};
 const MIN_CHI2: f64 = 2.0;
 /// Largest share of what exceeds the noise in χ² that a freed fixture leaves.
 const MAX_LEFT: f64 = 0.05;
-/// Largest probability of the fall of χ² by chance (F test).
-const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
 /// Maximum number of fixtures that are freed, each by itself.
 const MAX_FITTED: usize = 8;
 /// Smallest deviation of a freed number, in standard errors, at which the finding names it.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
-use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD, misfit};
+use super::misfit::{MIN_SPREAD, misfit, unreported};
 use super::mistaken_rows::MistakenRows;
 use super::outliers::{Outlier, outliers_as_json};
 use super::row_kind::{RowKind, format_error, row_noun};
@@ -15,7 +15,6 @@ use crate::fit::Identification;
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::residual_lengths::{noise_lengths_of_all, scatter};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
-use crate::model::parameter::{Parameter, ParameterSite};
 use crate::numeric::median;
 use crate::observation::kind_named;
 
@@ -177,7 +176,7 @@ pub(super) fn held_out_reached(fit: &CheckedFit) -> Vec<Finding> {
     let fitting = fit.fitting;
     let errors = fitting.position_errors(&fitting.split.held_out, &fit.end.x);
     let of_kind = |row_kind: RowKind| {
-        let RowKind { observation, spread, declared_sigma, .. } = row_kind;
+        let RowKind { observation, spread, .. } = row_kind;
         let kind = observation.kind();
         let is_of_kind = |row: usize| fitting.measurements.observation(row).kind() == kind;
         let held_out = fitting.split.held_out.iter().copied().zip(&errors);
@@ -185,7 +184,6 @@ pub(super) fn held_out_reached(fit: &CheckedFit) -> Vec<Finding> {
             held_out.filter(|(row, _)| is_of_kind(*row)).unzip();
         let lengths = errors.iter().map(nalgebra::Matrix::norm);
         let median = median(lengths.filter(|length| length.is_finite())).unwrap_or(0.0);
-        let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
         let text = format!(
             "half of the held-out {} are missed by more than {}, {:.0} % of the spread of the \
              fitted ones",
@@ -196,7 +194,7 @@ pub(super) fn held_out_reached(fit: &CheckedFit) -> Vec<Finding> {
         let numbers = [kind.into(), median.into(), spread.into()];
         let finding = || {
             let finding = Finding::new(FindingCode::HeldOutMissed, numbers, text);
-            match held_base(fitting) {
+            match held_base(fit) {
                 Some(base) => finding.with_remedy(format!(
                     "base[{base}] is held where it is declared, while another base is free: \
                      free it in [parameters], \"base[{base}].*\" = {{ free = true }}"
@@ -208,7 +206,7 @@ pub(super) fn held_out_reached(fit: &CheckedFit) -> Vec<Finding> {
                 },
             }
         };
-        (spread > MIN_SPREAD && median > MAX_MISS * spread && median > noise).then(finding)
+        (spread > MIN_SPREAD && median > unreported(&row_kind)).then(finding)
     };
     fit.kinds().into_iter().filter_map(of_kind).collect()
 }
@@ -231,17 +229,13 @@ pub(super) fn mistake(
 
 /// Returns the name of a base that held-out rows use and of which no coordinate is free, while those
 /// of another base are.
-fn held_base<'a>(fitting: &Fitting<'a>) -> Option<&'a str> {
-    let is_free = |base: usize| {
-        let is_of = |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { base: of, .. } if of == base);
-        fitting.model.parameters.iter().any(is_of)
-    };
-    let names = &fitting.placement.bases;
-    if !(0..names.len()).any(is_free) {
+fn held_base<'a>(fit: &CheckedFit<'a>) -> Option<&'a str> {
+    let Fitting { placement, split, .. } = *fit.fitting;
+    if !fit.is_base_free() {
         return None;
     }
-    let mut bases = fitting.split.held_out.iter().map(|&row| fitting.placement.base_of(row));
-    bases.find(|&base| !is_free(base)).map(|base| names[base].as_str())
+    let mut bases = split.held_out.iter().map(|&row| placement.base_of(row));
+    bases.find(|&base| !fit.frees_base(base)).map(|base| placement.bases[base].as_str())
 }
 
 /// Checks that the fitted arm predicts held-out rows not much worse than the registered nominal
@@ -250,7 +244,7 @@ pub(super) fn better_than_nominal(fit: &CheckedFit) -> Option<Finding> {
     let kind = fit.fitted.held_out.kind;
     let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
     let row_kind = fit.kinds().into_iter().find(|row_kind| row_kind.observation.kind() == kind);
-    let Some(RowKind { observation, taken_sigma, .. }) = row_kind else { return None };
+    let RowKind { observation, taken_sigma, .. } = row_kind?;
     let noise = observation.expected_norm() * taken_sigma;
     if !(after > MIN_ERROR_RATIO * before && after > MIN_NOISE_MULTIPLE * noise) {
         return None;

@@ -9,7 +9,6 @@ use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::misread::MAX_RATIO_ERROR_OF_ARM;
 use super::row_kind::format_error;
-use crate::fit::Noise;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::least_squares::{Linearisation, Triangle, jacobian_and_residual};
 use crate::measurement::MAX_FITTED_BASES;
@@ -50,18 +49,14 @@ const MAX_PRIOR_SIGMAS: f64 = 3.0;
 /// Checks that no parameter of the geometry that the problem holds, and no two of them, cause most of
 /// a misfit which contradicts the declared σ.
 pub(super) fn held_geometry_is_right(fit: &CheckedFit) -> Option<Finding> {
-    let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
-    let leading = fit.fitting.measurements.leading();
+    let leading = fit.table().leading();
     // Another reading of the table explains the misfit by itself, unless it is a small error of the
     // arm or the instrument.
     let reading = fit.explanations.get().and_then(|found| found.fitted.first());
     let is_misread = reading.is_some_and(|reading| {
         reading.effect.as_ref().is_none_or(|(_, size)| size.abs() >= MAX_RATIO_ERROR_OF_ARM)
     });
-    if !(is_contradicted && fit.has_further_fits && leading.is_position())
-        || fit.fitting.earlier.is_some()
-        || is_misread
-    {
+    if !(fit.contradicts_noise() && leading.is_position()) || is_misread {
         return None;
     }
     finding(fit, leading)
@@ -90,11 +85,7 @@ struct Freed {
 impl Trial {
     /// Summarises the errors of a fit of `fitting`, with its end.
     fn of(fit: &CheckedFit, rows: &[usize], (fitting, end): (&Fitting, &FitEnd)) -> Self {
-        let whole = fitting.whole();
-        let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
-        let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();
-        let configurations = fitting.measurements.configurations(fit.problem).0;
-        let errors = fitting.left_out_errors(&end.x, &unknowns, &configurations);
+        let errors = fitting.left_out(end, fit.problem);
         let squares: f64 = errors.iter().map(nalgebra::Matrix::norm_squared).sum();
         Self {
             rms: fit.rms(rows, &fitting.position_errors(rows, &end.x)),
@@ -107,17 +98,17 @@ impl Trial {
 fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
     let [single, pairs] = promising(fit).unwrap_or_default();
     // A problem with the base free is refused beyond this number.
-    let sessions = fit.fitting.measurements.session.names.len();
+    let sessions = fit.table().session.names.len();
     let may_move = !fit.is_base_free() && sessions <= MAX_FITTED_BASES;
     if single.is_empty() && pairs.is_empty() && !may_move {
         return None;
     }
     let rows = fit.kind(leading).rows;
-    let rms = fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x));
+    let rms = fit.rms(&rows, &fit.errors_at(&rows, &fit.end.x));
     // All fits have the declared σ, so that the priors weigh equally.
     let refit = |problem: &Problem, names: &[String]| {
         fit.with_problem(problem, |fitting| {
-            let end = fitting.run(&fitting.registered().ok()?).ok()?;
+            let end = fitting.refitted()?;
             let freed = |name: &String| {
                 if name == BASE {
                     return Some((shown_base(fitting, &end), "free = true"));
@@ -254,7 +245,7 @@ fn with_free(declared: &Problem, names: impl IntoIterator<Item = String>) -> Pro
 /// of the free parameters. These columns and r are extended by the rows of the priors. A second
 /// column gains the same of its part outside the first one.
 fn promising(fit: &CheckedFit) -> Option<[Vec<Vec<String>>; 2]> {
-    let is_free = |name: &str| fit.fitting.model.parameters.iter().any(|found| found.name == name);
+    let is_free = |name: &str| fit.model().parameters.iter().any(|found| found.name == name);
     let joints = 1..=fit.problem.joints.len();
     let all = joints.flat_map(|joint| FIELDS.map(|field| format!("joint{joint}.{field}")));
     let held: Vec<String> = all.filter(|name| !is_free(name)).collect();
@@ -275,7 +266,7 @@ fn promising(fit: &CheckedFit) -> Option<[Vec<Vec<String>>; 2]> {
 /// them, is expected to take away, with their indices, at the parameters of `fit`. `fitting` has all
 /// of them free.
 fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Vec<(Vec<usize>, f64)> {
-    let names = fit.fitting.model.parameters.iter().map(|parameter| parameter.name.as_str());
+    let names = fit.model().parameters.iter().map(|parameter| parameter.name.as_str());
     let known: std::collections::HashMap<&str, f64> =
         names.zip(fit.end.x.iter().copied()).collect();
     let parameters = &fitting.model.parameters;

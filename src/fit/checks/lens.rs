@@ -8,7 +8,7 @@ use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
 use super::finding::Finding;
-use super::freed::Freed;
+use super::freed::{Freed, MAX_CHANCE_PROBABILITY};
 use super::view_order::views;
 use crate::fit::{Estimate, FindingCode, Identification, IdentifyError, Placement};
 use crate::measurement::Dataset;
@@ -17,8 +17,6 @@ use crate::observation::Scene;
 use crate::problem::pattern::matches;
 use crate::problem::{CENTRE_X, FIRST_COEFFICIENT, Fixture, Freedom, Problem};
 
-/// Largest p-value of the F test at which freeing the intrinsics improves the fit significantly.
-const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
 /// Smallest p-value that is stated as a number; smaller ones are below the rounding errors.
 const LEAST_STATED_CHANCE: f64 = 1e-16;
 /// Largest probability that chance makes the parameters of one kind, such as the radial distortion,

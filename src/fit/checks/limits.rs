@@ -6,7 +6,6 @@ use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::row_kind::{format_error, listed};
 use crate::error::Location;
-use crate::fit::Noise;
 use crate::least_squares::solver::AtBound;
 use crate::model::parameter::{LinearConstraint, Parameter};
 use crate::problem::pattern::matches;
@@ -16,15 +15,12 @@ use crate::quantity::format::{decimals, number};
 /// Largest ratio of the rms residual without limits to that with them, at which the limits are
 /// refuted. The σ of a prior is refuted by the same ratio.
 const MAX_RATIO: f64 = 0.5;
-/// Maximum number of limits that the text names.
-const MAX_NAMED: usize = 3;
 /// Distance from a limit, relative to its size, at which the fit rests on it.
 const AT_LIMIT: f64 = 1e-6;
 
 /// Checks that bounds and constraints do not cause most of a misfit that contradicts the declared σ.
 pub(super) fn limits_hold(fit: &CheckedFit) -> Option<Finding> {
-    let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
-    if !is_contradicted || !fit.has_further_fits || fit.fitting.earlier.is_some() {
+    if !fit.contradicts_noise() {
         return None;
     }
     let limits = suspected(fit);
@@ -34,11 +30,11 @@ pub(super) fn limits_hold(fit: &CheckedFit) -> Option<Finding> {
     let kind = fit.leading();
     let before = fit.rms_at(&kind.rows, &fit.end.x);
     let after = fit.with_problem(&without_limits(fit.problem), |fitting| {
-        let end = fitting.run(&fitting.registered().ok()?).ok()?;
+        let end = fitting.refitted()?;
         Some(fit.rms(&kind.rows, &fitting.position_errors(&kind.rows, &end.x)))
     });
     let after = after.flatten().filter(|after| *after < MAX_RATIO * before)?;
-    let named = listed(&limits, MAX_NAMED);
+    let named = listed(&limits);
     let name = kind.observation.kind();
     let text = format!(
         "limits of the problem cause most of the misfit: {named}; without limits the \
@@ -53,7 +49,7 @@ pub(super) fn limits_hold(fit: &CheckedFit) -> Option<Finding> {
 /// Returns the limits on which the fit rests, and those that exclude the nominal arm, in words with
 /// their places.
 fn suspected(fit: &CheckedFit) -> Vec<String> {
-    let model = fit.fitting.model;
+    let model = fit.model();
     let bounds = fit.whole.unknowns.iter().zip(&fit.end.at_bound).filter_map(|(&k, at_bound)| {
         let parameter = &model.parameters[k];
         let excludes_nominal = parameter.lower > 0.0 || parameter.upper < 0.0;

@@ -7,14 +7,15 @@ use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::misreading::POSITION_UNITS;
 use super::row_kind::{RowKind, format_error, quantity_noun, spread, suspects};
+use crate::numeric::root_mean;
 use crate::problem::Observation;
 
 /// Largest rms residual of a fit, relative to the spread of the measurements, that is not reported
 /// as a misfit.
-pub(super) const MAX_MISS: f64 = 0.02;
+const MAX_MISS: f64 = 0.02;
 /// Largest rms residual of a fit, as a multiple of the declared σ, that is not reported, however
 /// small the spread of the measurements is.
-pub(super) const MAX_UNREPORTED_RESIDUAL: f64 = 100.0;
+const MAX_UNREPORTED_RESIDUAL: f64 = 100.0;
 /// Smallest ratio of the rms error of the fitted arm to that of the registered nominal arm, at
 /// which the fit is no better than the nominal arm.
 const MIN_UNIMPROVED_RATIO: f64 = 0.9;
@@ -61,6 +62,12 @@ pub(super) fn misfit(fit: &CheckedFit) -> Vec<Finding> {
     fit.kinds().into_iter().filter_map(of_kind).collect()
 }
 
+/// Returns the largest rms residual of rows of a kind that is no misfit.
+pub(super) fn unreported(kind: &RowKind) -> f64 {
+    let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
+    noise.max(MAX_MISS * kind.spread)
+}
+
 /// Function from the two numbers of a measured tilt \[rad\] to those that another reading means.
 type TiltReading = fn(&Vector3<f64>) -> [f64; 2];
 
@@ -84,15 +91,15 @@ fn reading_of_tilts(fit: &CheckedFit, kind: &RowKind, rms: f64) -> Option<&'stat
     if kind.observation.kind() != Observation::Tilt(0).kind() {
         return None;
     }
-    let measured = &fit.fitting.measurements.positions;
-    let errors = [&fit.end.x, fit.registered_x].map(|x| fit.fitting.position_errors(&kind.rows, x));
+    let measured = &fit.table().positions;
+    let errors = [&fit.end.x, fit.registered_x].map(|x| fit.errors_at(&kind.rows, x));
     let error = |reading: TiltReading| {
         let of_arm = errors.iter().map(|errors| {
             let squares = kind.rows.iter().zip(errors).map(|(&row, error)| {
                 let (read, predicted) = (reading(&measured[row]), measured[row] - error);
                 (read[0] - predicted.x).powi(2) + (read[1] - predicted.y).powi(2)
             });
-            (squares.sum::<f64>() / kind.rows.len() as f64).sqrt()
+            root_mean(squares)
         });
         of_arm.fold(f64::INFINITY, f64::min)
     };
@@ -108,8 +115,8 @@ pub(super) fn size_of_arm(fit: &CheckedFit) -> Vec<Finding> {
         if !observation.is_position() || fit.poses.poses.min(rows.len()) < MIN_POSES {
             return None;
         }
-        let nominal = fit.fitting.position_errors(rows, fit.registered_x);
-        let table = &fit.fitting.measurements;
+        let nominal = fit.errors_at(rows, fit.registered_x);
+        let table = &fit.table();
         let positions = &table.positions;
         let predicted =
             spread(fit.fitting.placement, rows, |place| positions[rows[place]] - nominal[place]);
@@ -121,9 +128,8 @@ pub(super) fn size_of_arm(fit: &CheckedFit) -> Vec<Finding> {
 /// Returns the finding that the rms error `rms` of an arm is large relative to both the spread and
 /// the declared σ of rows of a kind; `None` if it is not.
 fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
-    let RowKind { observation, spread, declared_sigma, .. } = *kind;
-    let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
-    if !(spread > MIN_SPREAD && rms > MAX_MISS * spread && rms > noise) {
+    let RowKind { observation, spread, .. } = *kind;
+    if !(spread > MIN_SPREAD && rms > unreported(kind)) {
         return None;
     }
     let kind = observation.kind();

@@ -13,6 +13,7 @@ use crate::fit::stages::fitting::Fitting;
 use crate::fit::stages::stage::Stage;
 use crate::model::Pose;
 use crate::model::parameter::{Parameter, ParameterSite};
+use crate::numeric::{self, root_mean};
 
 /// Minimum number of rows that show where the base or the target stands.
 const MIN_MOVED_ROWS: usize = 6;
@@ -22,8 +23,6 @@ const MIN_REGISTERED_ROWS: usize = 12;
 const MAX_RATIO_TO_TARGET: f64 = 0.5;
 /// Maximum number of different payloads of a table that are tried in each row.
 const MAX_PAYLOADS: usize = 12;
-/// Maximum number of rows that the words list.
-const MAX_LISTED: usize = 3;
 /// Units of a length that a table may confuse: factors of the measured numbers, with their words.
 const LENGTH_FACTORS: [(f64, &str); 6] = [
     (1e3, "multiply them by 1000"),
@@ -48,8 +47,8 @@ pub(super) struct MistakenRows<'a, 'f> {
 impl MistakenRows<'_, '_> {
     /// Returns the words for the mistake that explains the rows; `None` if none does.
     pub fn cause(&self) -> Option<String> {
-        let table = self.fit.fitting.measurements;
-        let errors = self.fit.fitting.position_errors(self.rows, self.x);
+        let table = self.fit.table();
+        let errors = self.fit.errors_at(self.rows, self.x);
         let measured = self.rows.iter().map(|&row| table.positions[row]);
         let pairs = measured.zip(errors).map(|(measured, error)| (measured, measured - error));
         let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = pairs.collect();
@@ -89,7 +88,7 @@ impl MistakenRows<'_, '_> {
             let others = (0..words.len()).filter_map(|word| Some((word, placed(pose, word)?)));
             let (others, places): (Vec<usize>, Vec<(usize, usize)>) = others.unzip();
             let poses = places.into_iter().map(|(base, target)| Pose { base, target, ..*pose });
-            let errors = self.fit.fitting.model.residuals(poses.collect::<Vec<_>>(), self.x);
+            let errors = self.fit.model().residuals(poses.collect::<Vec<_>>(), self.x);
             let near = errors.iter().position(|error| error.norm() < self.limit)?;
             found.insert(words[others[near]].as_str());
         }
@@ -102,11 +101,9 @@ impl MistakenRows<'_, '_> {
 
     /// Returns the words for rows that each fit with a payload that other rows of the table have.
     fn of_other_payload(&self) -> Option<String> {
-        let table = self.fit.fitting.measurements;
+        let table = self.fit.table();
         let column = table.payload.as_ref()?;
-        let mut levels = column.clone();
-        levels.sort_by(f64::total_cmp);
-        levels.dedup();
+        let levels = numeric::levels(column.iter().copied());
         if levels.len() > MAX_PAYLOADS {
             return None;
         }
@@ -123,25 +120,24 @@ impl MistakenRows<'_, '_> {
                 }
             }
         }
-        let squares: f64 = best.iter().map(|(_, error)| error.powi(2)).sum();
         let changed = self.rows.iter().zip(&best);
         let changed = changed.filter(|(row, (level, _))| column[**row].total_cmp(level).is_ne());
         let words =
             changed.map(|(&row, (level, _))| format!("{level} kg in {}", table.location(row)));
         let words: Vec<String> = words.collect();
-        let is_explained = (squares / self.rows.len() as f64).sqrt() < self.limit;
+        let is_explained = root_mean(best.iter().map(|(_, error)| error.powi(2))) < self.limit;
         (is_explained && words.len() > 1)
-            .then(|| format!("they fit with other payloads: {}", listed(&words, MAX_LISTED)))
+            .then(|| format!("they fit with other payloads: {}", listed(&words)))
     }
 
     /// Returns the words for positions that belong to the joint angles of other rows of the table. A
     /// shift leaves a row without a position.
     fn of_other_joint_angles(&self) -> Option<String> {
         let Self { fit, x, rows: chosen, limit } = *self;
-        let table = fit.fitting.measurements;
+        let table = fit.table();
         let is_position = |row: &usize| table.observation(*row).is_position();
         let every_row: Vec<usize> = (0..table.len()).filter(is_position).collect();
-        let errors = fit.fitting.position_errors(&every_row, x);
+        let errors = fit.errors_at(&every_row, x);
         let predicted: Vec<(usize, Vector3<f64>)> = every_row
             .iter()
             .zip(errors)
@@ -181,7 +177,7 @@ impl MistakenRows<'_, '_> {
     /// joint.
     fn of_joints(&self) -> Option<String> {
         let Self { fit, x, rows: chosen, limit } = *self;
-        let table = fit.fitting.measurements;
+        let table = fit.table();
         let joints: Vec<usize> = moving(fit).collect();
         let is_turning = |joint: &usize| fit.turns(*joint);
         let turning: Vec<usize> = joints.iter().copied().filter(is_turning).collect();
@@ -195,16 +191,10 @@ impl MistakenRows<'_, '_> {
             let fitting = Fitting { measurements: &corrected, ..fit.fitting.with_declared_noise() };
             fit.rms(chosen, &fitting.position_errors(chosen, x)) < limit
         };
-        let in_degrees = 1_f64.to_radians();
-        if fits(&turning, in_degrees.recip()) {
-            return Some(
-                "their joint angles are in radians, unlike those of the others".to_owned(),
-            );
-        }
-        if fits(&turning, in_degrees) {
-            return Some(
-                "their joint angles are in degrees, unlike those of the others".to_owned(),
-            );
+        let degree = 1_f64.to_radians();
+        let units = [(degree.recip(), "radians"), (degree, "degrees")];
+        if let Some((_, unit)) = units.into_iter().find(|(factor, _)| fits(&turning, *factor)) {
+            return Some(format!("their joint angles are in {unit}, unlike those of the others"));
         }
         let joint = joints.into_iter().find(|&joint| fits(&[joint], -1.0))?;
         Some(format!("their {} has the other sign", column_name(table, joint)))
@@ -212,7 +202,7 @@ impl MistakenRows<'_, '_> {
 
     /// Returns the words for rows that fit where the target or the base, or both, stand elsewhere.
     fn of_moved_place(&self) -> Option<String> {
-        let table = self.fit.fitting.measurements;
+        let table = self.fit.table();
         let is_enough = self.rows.len() >= MIN_MOVED_ROWS;
         is_enough.then(|| self.fit.with_rows(table, self.rows, |of| self.of_place_in(of)))?
     }
@@ -293,7 +283,7 @@ impl MistakenRows<'_, '_> {
 
     /// Returns the words for positions in another unit, from another base.
     fn of_unit(&self) -> Option<String> {
-        let table = self.fit.fitting.measurements;
+        let table = self.fit.table();
         let fits = |&(factor, _): &(f64, &str)| {
             let mut converted = table.clone();
             for &row in self.rows {
@@ -312,48 +302,41 @@ impl MistakenRows<'_, '_> {
 /// with that word; `None` for the word that it has.
 type Placed<'a> = dyn Fn(&Pose<'_>, usize) -> Option<(usize, usize)> + 'a;
 
-/// Function of a measured and a predicted position that returns the corrected measurement.
-type Correction<'a> = dyn Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + 'a;
+/// Function that corrects a measured position; it may take numbers of the predicted one.
+type Correction = Box<dyn Fn(Vector3<f64>, &Vector3<f64>) -> Vector3<f64>>;
 
 /// Returns the words for a mistake that explains pairs of measured and predicted positions to
 /// `limit` \[m\].
 fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String> {
-    let fits = |corrected: &Correction| {
-        let square = |(measured, predicted): &(Vector3<f64>, Vector3<f64>)| {
-            (corrected(measured, predicted) - predicted).norm_squared()
+    let mut mistakes: Vec<(String, Correction)> = Vec::new();
+    for (axis, name) in AXES.into_iter().enumerate() {
+        let signed = move |mut at: Vector3<f64>, _: &_| {
+            at[axis] = -at[axis];
+            at
         };
-        (pairs.iter().map(square).sum::<f64>() / pairs.len() as f64).sqrt() < limit
+        mistakes.push((format!("{name} has the other sign"), Box::new(signed)));
+    }
+    for [a, b] in [[0, 1], [0, 2], [1, 2]] {
+        let exchanged = move |mut at: Vector3<f64>, _: &_| {
+            at.swap_rows(a, b);
+            at
+        };
+        mistakes.push((format!("{} and {} are exchanged", AXES[a], AXES[b]), Box::new(exchanged)));
+    }
+    for (factor, words) in LENGTH_FACTORS {
+        let words = format!("positions are in another unit: {words}");
+        mistakes.push((words, Box::new(move |at, _| at * factor)));
+    }
+    for (axis, name) in AXES.into_iter().enumerate() {
+        let replaced = move |mut at: Vector3<f64>, predicted: &Vector3<f64>| {
+            at[axis] = predicted[axis];
+            at
+        };
+        mistakes.push((format!("{name} alone is wrong"), Box::new(replaced)));
+    }
+    let fits = |(_, correct): &(String, Correction)| {
+        let squares = pairs.iter().map(|(at, of)| (correct(*at, of) - of).norm_squared());
+        root_mean(squares) < limit
     };
-    let sign = (0..3).find(|&axis| {
-        fits(&|measured, _| {
-            let mut corrected = *measured;
-            corrected[axis] = -corrected[axis];
-            corrected
-        })
-    });
-    if let Some(axis) = sign {
-        return Some(format!("their {} has the other sign", AXES[axis]));
-    }
-    let exchanged = [(0, 1), (0, 2), (1, 2)].into_iter().find(|&(first, second)| {
-        fits(&|measured, _| {
-            let mut corrected = *measured;
-            corrected.swap_rows(first, second);
-            corrected
-        })
-    });
-    if let Some((first, second)) = exchanged {
-        return Some(format!("their {} and {} are exchanged", AXES[first], AXES[second]));
-    }
-    let mut factors = LENGTH_FACTORS.into_iter();
-    if let Some((_, words)) = factors.find(|(factor, _)| fits(&|measured, _| measured * *factor)) {
-        return Some(format!("their positions are in another unit: {words}"));
-    }
-    let axis = (0..3).find(|&axis| {
-        fits(&|measured, predicted| {
-            let mut corrected = *measured;
-            corrected[axis] = predicted[axis];
-            corrected
-        })
-    });
-    axis.map(|axis| format!("their {} alone is wrong", AXES[axis]))
+    mistakes.into_iter().find(fits).map(|(words, _)| format!("their {words}"))
 }

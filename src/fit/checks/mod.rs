@@ -153,6 +153,21 @@ const BEYOND_PRIOR_FIRST: &str =
 const BEYOND_NOISE: [FindingCode; 2] =
     [FindingCode::NoiseBeyondDeclared, FindingCode::ResidualBeyondDeclared];
 
+/// Returns true if one of the findings has one of the codes.
+fn has(findings: &[Finding], codes: &[FindingCode]) -> bool {
+    findings.iter().any(|found| codes.contains(&found.code))
+}
+
+/// Returns true unless a finding states a cause that no fit shows.
+fn is_shown(found: &Finding) -> bool {
+    !found.value("after").is_some_and(Value::is_null)
+}
+
+/// Returns true if a finding has a remedy that is specific to its case.
+fn names_remedy(found: &Finding) -> bool {
+    found.remedy != found.code.entry().remedy
+}
+
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     let found = |check: &Check| match check {
@@ -171,85 +186,78 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         findings.retain(|found| !doubted_rows::is_open(found));
     }
     // A mistake in the whole table or in some rows may look like a change from a row on.
-    let is_of_table = |found: &Finding| OF_TABLE.contains(&found.code);
-    if findings.iter().any(is_of_table) {
+    if has(&findings, &OF_TABLE) {
         findings.retain(|found| found.code != FindingCode::RowsChanged);
     }
     // Rows that explain the misfit are shown by a fit, columns without one are only suspected.
-    if findings.iter().any(|found| found.code == FindingCode::RowsDoubted) {
-        let is_shown = |found: &Finding| !found.value("after").is_some_and(Value::is_null);
+    if has(&findings, &[FindingCode::RowsDoubted]) {
         findings.retain(|found| found.code != FindingCode::ColumnDoubted || is_shown(found));
     }
     // A unit that the size of the arm shows is the reason for distrust, unless a reading fits.
-    let shows_unit = |found: &Finding| {
-        found.code == FindingCode::OtherSize && found.remedy != found.code.entry().remedy
-    };
-    if !findings.iter().any(|found| found.code == FindingCode::Misread) {
-        findings.sort_by_key(|found| !shows_unit(found));
+    if !has(&findings, &[FindingCode::Misread]) {
+        findings.sort_by_key(|found| found.code != FindingCode::OtherSize || !names_remedy(found));
     }
     // Where a check names the cause of a misfit, the findings on the misfit state this cause.
     let cause = CAUSES.iter().find_map(|code| findings.iter().find(|found| found.code == *code));
-    // The finding on the limits states the errors after its cause.
-    let words = |finding: &Finding| match finding.code {
-        FindingCode::LimitContradicted => {
-            finding.text.split("; without limits").next().map(str::to_owned)
-        }
-        _ => Some(finding.to_string()),
-    };
-    // Without a fit that shows it, a cause is only one that may be.
-    let is_shown = cause.is_none_or(|cause| !cause.value("after").is_some_and(Value::is_null));
-    let cause_text = cause.and_then(words);
-    if let Some(text) = &cause_text {
-        for finding in &mut findings {
-            if OF_MISFIT.contains(&finding.code) {
-                let remedy = if is_shown {
+    let cause = cause.and_then(|found| {
+        // The finding on the limits states the errors after its cause.
+        let text = match found.code {
+            FindingCode::LimitContradicted => found.text.split("; without limits").next()?.into(),
+            _ => found.to_string(),
+        };
+        Some((text, is_shown(found)))
+    });
+    match &cause {
+        Some((text, is_shown)) => {
+            for finding in findings.iter_mut().filter(|found| OF_MISFIT.contains(&found.code)) {
+                finding.remedy = if *is_shown {
                     text.clone()
                 } else {
+                    // Without a fit that shows it, a cause is only one that may be.
                     format!("{text}; otherwise {}", finding.code.entry().remedy)
                 };
-                finding.remedy = remedy;
             }
         }
-    }
-    if cause_text.is_none() {
-        state_explanations(&mut findings);
+        None => state_explanations(&mut findings),
     }
     // Where the input is wrong, advice on poses, priors or σ would lead away from the mistake.
-    if findings.iter().any(|found| MISTAKES.contains(&found.code)) {
-        let remedy = "correct first the mistake that another warning names";
-        let is_consequence = |found: &&mut Finding| {
-            CONSEQUENCES.contains(&found.code)
-                && (cause_text.is_none() || !OF_MISFIT.contains(&found.code))
-                || found.code == FindingCode::NominalFarOff
-        };
-        for finding in findings.iter_mut().filter(is_consequence) {
-            finding.remedy = remedy.to_owned();
+    if has(&findings, &MISTAKES) {
+        for finding in &mut findings {
+            if CONSEQUENCES.contains(&finding.code)
+                && (cause.is_none() || !OF_MISFIT.contains(&finding.code))
+                || finding.code == FindingCode::NominalFarOff
+            {
+                finding.remedy = "correct first the mistake that another warning names".into();
+            }
         }
-    } else if cause_text.is_none() {
+    } else if cause.is_none() {
         let remedy = if fit.ignores_elasticity() {
             "strategy rigid ignores the elasticity that the problem declares, so fit with \
              strategy joint"
-        } else if findings.iter().any(|found| found.code == FindingCode::StrategyMisfit) {
+        } else if has(&findings, &[FindingCode::StrategyMisfit]) {
             FindingCode::StrategyMisfit.entry().remedy
         } else {
             ""
         };
         let is_of_strategy = |found: &&mut Finding| OF_STRATEGY.contains(&found.code);
         for finding in findings.iter_mut().filter(is_of_strategy).filter(|_| !remedy.is_empty()) {
-            finding.remedy = remedy.to_owned();
+            finding.remedy = remedy.into();
         }
     }
     state_held_out_remedies(&mut findings);
     // Other findings say more of the held-out rows.
-    let says_more = |found: &Finding| {
-        found.code.entry().severity == Severity::Error
-            || [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutOutliers]
-                .contains(&found.code)
-    };
-    if findings.iter().any(says_more) {
+    let say_more = [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutOutliers];
+    let is_error = |found: &Finding| found.severity() == Severity::Error;
+    if has(&findings, &say_more) || findings.iter().any(is_error) {
         findings.retain(|found| found.code != FindingCode::HeldOutUncertain);
     }
     findings
+}
+
+/// Returns the readings of the input that a finding names.
+fn readings(found: &Finding) -> Vec<String> {
+    let words = found.value("explanations").and_then(Value::as_array);
+    words.into_iter().flatten().filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
 /// Names the limits of the problem before another reading of the input, if the fit without them
@@ -260,20 +268,15 @@ fn state_limits_first(findings: &mut [Finding]) {
     let Some((limits, misread)) = places else { return };
     let [without_limits, corrected] =
         [limits, misread].map(|place| findings[place].number("after").unwrap_or(f64::NAN));
-    let text = &findings[limits].text;
-    let Some((_, errors)) = text.split_once("; without limits ") else { return };
+    let Some((_, errors)) = findings[limits].text.split_once("; without limits ") else { return };
     if without_limits <= MAX_EQUAL_ERRORS * corrected {
-        let readings = findings[misread].value("explanations").and_then(Value::as_array);
-        let readings = readings.into_iter().flatten().filter_map(Value::as_str);
-        let readings: Vec<String> = readings.map(str::to_owned).collect();
         let text = format!(
             "limits of the problem cause most of the misfit (another warning lists them): without \
              them {errors}; a misreading would explain as much: {}",
-            first_of(&readings)
+            first_of(&readings(&findings[misread]))
         );
-        let remedy = "check the limits first";
-        let stated = Finding { text, ..findings[misread].clone() };
-        findings[misread] = stated.with_remedy(remedy);
+        let remedy = "check the limits first".to_owned();
+        findings[misread] = Finding { text, remedy, ..findings[misread].clone() };
     }
 }
 
@@ -281,72 +284,57 @@ fn state_limits_first(findings: &mut [Finding]) {
 /// nominal arm's error.
 fn state_explanations(findings: &mut [Finding]) {
     let nominal = findings.iter().find(|found| found.code == FindingCode::NominalFarOff);
-    let words = nominal.and_then(|found| found.value("explanations")?.as_array());
-    let words = words.into_iter().flatten().filter_map(Value::as_str);
-    let words: Vec<String> = words.map(str::to_owned).collect();
+    let words = nominal.map_or_else(Vec::new, readings);
     if words.is_empty() {
         return;
     }
-    let suspect = format!("check first for {}", first_of(&words));
-    let is_of_misfit = |found: &&mut Finding| FAR_OFF.contains(&found.code);
-    for finding in findings.iter_mut().filter(is_of_misfit) {
-        let remedy = format!(
-            "{suspect}, with which the nominal arm misses far less; otherwise {}",
+    for finding in findings.iter_mut().filter(|found| FAR_OFF.contains(&found.code)) {
+        finding.remedy = format!(
+            "check first for {}, with which the nominal arm misses far less; otherwise {}",
+            first_of(&words),
             finding.remedy
         );
-        finding.remedy = remedy;
     }
 }
 
 /// Replaces remedies about held-out rows that would lead away from a misfit of the fitted rows.
 fn state_held_out_remedies(findings: &mut [Finding]) {
-    let has = |codes: &[FindingCode]| findings.iter().any(|found| codes.contains(&found.code));
-    let (is_far_off, is_beyond_noise) = (has(&FAR_OFF), has(&BEYOND_NOISE));
-    let has_cause = has(&[FindingCode::RowsSetAside]);
-    let is_beyond_prior = has(&[FindingCode::BeyondPrior]);
-    let names_mistake = |found: &Finding| {
-        found.code == FindingCode::HeldOutMissed && found.remedy != found.code.entry().remedy
+    use FindingCode::{
+        BeyondPrior, HeldOutBeyondPrediction, HeldOutMissed, HeldOutNotBetter, HeldOutOutliers,
+        HeldOutWorse, NominalFarOff, RowsSetAside,
     };
-    let are_held_out_wrong = findings.iter().any(names_mistake);
+    let [is_far_off, is_beyond_noise, has_cause, is_beyond_prior] =
+        [&FAR_OFF[..], &BEYOND_NOISE, &[RowsSetAside], &[BeyondPrior]]
+            .map(|codes| has(findings, codes));
+    let are_held_out_wrong =
+        findings.iter().any(|found| found.code == HeldOutMissed && names_remedy(found));
     // Names of fixtures stand in brackets.
     let is_of_fixture = findings.iter().any(|found| {
-        found.code == FindingCode::BeyondPrior
-            && found.word("parameter").is_some_and(|name| name.contains('['))
+        found.code == BeyondPrior && found.word("parameter").is_some_and(|name| name.contains('['))
     });
     for finding in findings {
-        let has_readings = finding.value("explanations").and_then(Value::as_array);
-        if finding.code == FindingCode::NominalFarOff
-            && is_of_fixture
-            && has_readings.is_none_or(Vec::is_empty)
-        {
-            finding.remedy = BEYOND_PRIOR_FIRST.to_owned();
-        }
+        let is_default = !names_remedy(finding);
         // Remedies that name a cause stay.
-        if finding.remedy != finding.code.entry().remedy {
-            continue;
-        }
         let remedy = match finding.code {
-            FindingCode::HeldOutBeyondPrediction if are_held_out_wrong => {
+            NominalFarOff if is_of_fixture && readings(finding).is_empty() => BEYOND_PRIOR_FIRST,
+            _ if !is_default => continue,
+            HeldOutBeyondPrediction if are_held_out_wrong => {
                 "correct first the held-out rows that another warning names"
             }
-            FindingCode::HeldOutBeyondPrediction if is_beyond_prior => BEYOND_PRIOR_FIRST,
-            FindingCode::HeldOutWorse
-            | FindingCode::HeldOutNotBetter
-            | FindingCode::HeldOutOutliers
-                if is_far_off =>
-            {
+            HeldOutBeyondPrediction if is_beyond_prior => BEYOND_PRIOR_FIRST,
+            HeldOutWorse | HeldOutNotBetter | HeldOutOutliers if is_far_off => {
                 "find first why the fitted rows are missed; more poses or other priors do not \
                  mend that"
             }
-            FindingCode::HeldOutOutliers if has_cause => {
+            HeldOutOutliers if has_cause => {
                 "the cause that sets fitted rows aside may act there too: look for it first"
             }
-            FindingCode::HeldOutOutliers if is_beyond_noise => {
+            HeldOutOutliers if is_beyond_noise => {
                 "the fitted rows are off too: look first for what the model lacks with flexcal \
                  loop, then at these rows"
             }
             _ => continue,
         };
-        finding.remedy = remedy.to_owned();
+        remedy.clone_into(&mut finding.remedy);
     }
 }

@@ -9,7 +9,7 @@ use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::misreading::{Explanations, Misreading, first_of, is_of_views};
 use super::row_kind::{RowKind, format_error, quantity_noun, suspects};
-use crate::model::parameter::{Parameter, ParameterSite};
+use crate::model::parameter::ParameterSite;
 
 /// Largest error of the registered nominal arm (rms, or median of images), relative to the spread of
 /// the measurements, that is not reported.
@@ -35,7 +35,7 @@ const MIN_SIZE_ERROR: f64 = 0.1;
 /// are any): the rms error, or the median error of images, because a view from near may have errors
 /// far above those of all others.
 fn nominal_miss(fit: &CheckedFit) -> f64 {
-    if is_of_views(fit.fitting.measurements) {
+    if is_of_views(fit.table()) {
         fit.fitting.typical_error(fit.registered_x)
     } else {
         fit.registered.identification.rms.norm
@@ -49,33 +49,34 @@ pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
     let RowKind { observation, spread, .. } = fit.leading();
     let is_measured_directly = observation.is_measured_directly();
     let min_spread =
-        if is_measured_directly { 0.0 } else { MIN_RELATIVE_SPREAD * fit.fitting.model.reach() };
+        if is_measured_directly { 0.0 } else { MIN_RELATIVE_SPREAD * fit.model().reach() };
     spread > min_spread && rms > MAX_NOMINAL_MISS * spread
 }
 
 impl CheckedFit<'_> {
+    /// Returns true if a parameter of one of some sites is free.
+    pub fn frees(&self, is_meant: impl Fn(ParameterSite) -> bool) -> bool {
+        self.fitting.model.parameters.iter().any(|parameter| is_meant(parameter.site))
+    }
+
+    /// Returns true if a coordinate of the base with the index `base` is a free parameter.
+    pub fn frees_base(&self, base: usize) -> bool {
+        self.frees(|site| matches!(site, ParameterSite::Base { base: of, .. } if of == base))
+    }
+
     /// Returns true if a coordinate of a base is a free parameter.
     pub fn is_base_free(&self) -> bool {
-        let is_of_base =
-            |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
-        self.fitting.model.parameters.iter().any(is_of_base)
+        self.frees(|site| matches!(site, ParameterSite::Base { .. }))
     }
 
     /// Returns true if no coordinate of one of the bases is a free parameter.
     pub fn is_a_base_held(&self) -> bool {
-        let parameters = &self.fitting.model.parameters;
-        let is_free = |base: usize| {
-            let is_of_base = |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { base: of, .. } if of == base);
-            parameters.iter().any(is_of_base)
-        };
-        !(0..self.fitting.placement.bases.len()).all(is_free)
+        !(0..self.fitting.placement.bases.len()).all(|base| self.frees_base(base))
     }
 
     /// Returns true if no coordinate of a target is a free parameter.
     pub fn is_target_held(&self) -> bool {
-        let is_of_target =
-            |parameter: &Parameter| matches!(parameter.site, ParameterSite::Target { .. });
-        !self.fitting.model.parameters.iter().any(is_of_target)
+        !self.frees(|site| matches!(site, ParameterSite::Target { .. }))
     }
 }
 
@@ -99,7 +100,7 @@ pub(super) fn nominal_is_near(fit: &CheckedFit) -> Option<Finding> {
 /// such camera.
 fn image_size(fit: &CheckedFit) -> Option<String> {
     let mut ratios: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-    for (parameter, x) in fit.fitting.model.parameters.iter().zip(&fit.end.x) {
+    for (parameter, x) in fit.model().parameters.iter().zip(&fit.end.x) {
         if let ParameterSite::Fixture { fixture, axis: 6..=9, .. } = parameter.site {
             ratios.entry(fixture).or_default().push(1.0 + x / parameter.nominal);
         }
@@ -109,7 +110,7 @@ fn image_size(fit: &CheckedFit) -> Option<String> {
         let is_alike = |other: &f64| (other / ratio - 1.0).abs() < MAX_SIZE_DIFFERENCE;
         let is_other = ratios.len() == 4 && (ratio - 1.0).abs() > MIN_SIZE_ERROR;
         (is_other && ratios.iter().all(is_alike)).then(|| {
-            let name = fit.fitting.model.fixture_name(*fixture);
+            let name = fit.model().fixture_name(*fixture);
             format!(
                 "fx, fy, cx and cy of camera \"{name}\" are {ratio:.2} of the declared ones: the \
                  images have another size than those that focal_px and centre_px are of; correct \
@@ -129,7 +130,7 @@ fn far_off_finding(
     is_base_free: bool,
     (explanations, left): (&[Misreading], f64),
 ) -> Finding {
-    let words: Vec<String> = explanations.iter().map(Misreading::to_string).collect();
+    let words: Vec<String> = explanations.iter().map(|of| of.words.clone()).collect();
     let numbers = [kind.into(), rms.into(), spread.into(), json!(words)];
     if !rms.is_finite() {
         let text = "the nominal arm misses the measurements by more than can be computed";

@@ -12,7 +12,7 @@ use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::open_scale::scaled_lengths;
 use super::open_views;
-use super::row_kind::listed;
+use super::row_kind::listed_up_to;
 use crate::fit::stages::parameter_size::plausible_size;
 use crate::least_squares::{UnidentifiableCombination, Weak};
 use crate::measurement::Measurements;
@@ -110,7 +110,7 @@ pub(super) fn named_directions(fit: &CheckedFit) -> Vec<Finding> {
         let set_up: Vec<usize> = (0..parameters.len()).filter(is_set_up).collect();
         return open_views::undecided_set_up(fit, &set_up).into_iter().collect();
     }
-    let model = fit.fitting.model;
+    let model = fit.model();
     let size = |parameter: &&Parameter| {
         let without_prior = Parameter { sigma: None, ..(*parameter).clone() };
         plausible_size(model, &without_prior).unwrap_or(match parameter.unit() {
@@ -133,7 +133,7 @@ pub(super) fn named_directions(fit: &CheckedFit) -> Vec<Finding> {
         {
             return finding;
         }
-        let [text, remedy] = kind.words(&listed(&involved, MAX_NAMED));
+        let [text, remedy] = kind.words(&listed_up_to(&involved, MAX_NAMED));
         let numbers = [json!(kind.word()), json!(involved)];
         Finding::new(FindingCode::NotToldApart, numbers, text).with_remedy(remedy)
     };
@@ -145,7 +145,7 @@ pub(super) fn named_directions(fit: &CheckedFit) -> Vec<Finding> {
     }
     // The nominal arm misses contacts, so that another scale changes the data there.
     if open.iter().all(|quantity| quantity.kind != Open::Scale) {
-        let lengths = scaled_lengths(fit.problem, fit.fitting.measurements, &names);
+        let lengths = scaled_lengths(fit.problem, fit.table(), &names);
         let scale = |names| OpenQuantity { kind: Open::Scale, names, unknowns: Vec::new() };
         open.extend(lengths.map(scale));
     }
@@ -178,7 +178,7 @@ pub(crate) fn open_scale(
     unknowns: &[&str],
 ) -> Option<String> {
     let lengths = scaled_lengths(problem, table, unknowns)?;
-    Some(Open::Scale.words(&listed(&lengths, MAX_NAMED)).join("; "))
+    Some(Open::Scale.words(&listed_up_to(&lengths, MAX_NAMED)).join("; "))
 }
 
 /// Returns a sentence with a remedy for each kind of quantity that unidentifiable `combinations` of
@@ -197,7 +197,8 @@ pub(crate) fn open_quantities(
     if !names.iter().any(|name| is_fixture(name)) {
         return Vec::new();
     }
-    let sentence = |open: OpenQuantity| open.kind.words(&listed(&open.names, MAX_NAMED)).join("; ");
+    let sentence =
+        |open: OpenQuantity| open.kind.words(&listed_up_to(&open.names, MAX_NAMED)).join("; ");
     open_directions(&rows, &names).into_iter().map(sentence).collect()
 }
 

@@ -81,7 +81,7 @@ pub(super) fn undecided_set_up(fit: &CheckedFit, set_up: &[usize]) -> Option<Fin
     }
     let rows: Vec<Pose> =
         fit.whole.poses.iter().filter(|pose| pose.orientation.is_some()).copied().collect();
-    let frames = fit.fitting.model.frames(&rows, fit.end.x.as_slice());
+    let frames = fit.model().frames(&rows, fit.end.x.as_slice());
     let mut movement = Movement::default();
     movement.widen(&frames.into_iter().flatten().collect::<Vec<_>>());
     let (kind, why) = movement.reason(["the tool", "the tool"]);
@@ -170,7 +170,7 @@ impl Movement {
 /// Returns the movement of the cameras and markers for whose index `is_involved` returns true;
 /// `None` if no row shows one of the markers to one of the cameras.
 fn movement(fit: &CheckedFit, is_involved: impl Fn(usize) -> bool) -> Option<Movement> {
-    let (model, x) = (fit.fitting.model, fit.end.x.as_slice());
+    let (model, x) = (fit.model(), fit.end.x.as_slice());
     let of_pose = |pose: &Pose| match pose.observation.fixtures() {
         [Some(camera), Some(marker)] if is_involved(camera) || is_involved(marker) => {
             Some([camera, marker])

@@ -7,6 +7,7 @@ use super::convention::{IN_RADIANS, MAX_EXPLAINED_RATIO, fitting_conventions};
 use super::finding::{Finding, FindingCode};
 use super::priors::MAX_NOISE_FACTOR;
 use super::turned_rows::mistaken_orientations;
+use crate::numeric::root_mean;
 
 /// Smallest root mean squared error of orientation at which another convention or frame is
 /// suspected \[rad\]: 2°.
@@ -23,12 +24,9 @@ pub(super) fn orientations_fit(fit: &CheckedFit) -> Option<Finding> {
     let fitting = fit.fitting;
     let rows = &fitting.split.identification;
     let turns = fitting.model.orientation_residuals(fitting.poses(rows), &fit.end.x);
-    let lengths: Vec<f64> = turns
-        .iter()
-        .map(nalgebra::Matrix::norm_squared)
-        .filter(|square| square.is_finite())
-        .collect();
-    let rms = (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).sqrt();
+    let squares =
+        turns.iter().map(nalgebra::Matrix::norm_squared).filter(|square| square.is_finite());
+    let rms = root_mean(squares);
     if !(rms > MIN_SUSPECT_ANGLE && rms > MIN_SIGMAS * sigma) {
         return of_sigma(fit, rms / 3_f64.sqrt(), sigma);
     }

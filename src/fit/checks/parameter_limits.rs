@@ -117,7 +117,7 @@ fn fixture_remedy(fit: &CheckedFit, fixture: usize, (kind, axis): (FixtureKind, 
     let Some(declared) = fit.problem.fixtures.get(fixture) else { return String::new() };
     let mut numbers: Vec<f64> =
         declared.known.iter().map(|number| number.unwrap_or_default()).collect();
-    for (parameter, x) in fit.fitting.model.parameters.iter().zip(&fit.end.x) {
+    for (parameter, x) in fit.model().parameters.iter().zip(&fit.end.x) {
         if let ParameterSite::Fixture { fixture: of, axis, .. } = parameter.site
             && of == fixture
             && parameter.regressor.is_constant()
@@ -161,7 +161,7 @@ fn wider_priors(fit: &CheckedFit, parameter: &Parameter) -> Option<String> {
 
 /// Returns the number of lengths of joints for which `is_far` is true.
 fn lengths_beyond(fit: &CheckedFit, is_far: impl Fn(&Parameter, f64) -> bool) -> usize {
-    let fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
+    let fitted = fit.model().parameters.iter().zip(&fit.end.x);
     let is_length = |parameter: &Parameter| {
         matches!(parameter.site, ParameterSite::Joint { .. }) && parameter.unit() == Unit::Length
     };
@@ -174,7 +174,7 @@ const STIFFNESS_UNITS: [(f64, &str); 3] =
 
 /// Returns the fitted deviation of a parameter from nominal.
 fn fitted_deviation(fit: &CheckedFit, parameter: &Parameter) -> Option<f64> {
-    let mut fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
+    let mut fitted = fit.model().parameters.iter().zip(&fit.end.x);
     fitted.find(|(other, _)| std::ptr::eq(*other, parameter)).map(|(_, x)| *x)
 }
 
@@ -224,8 +224,8 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
                 .to_owned(),
         );
     }
-    let kind = fit.fitting.measurements.leading().kind();
-    if parameter.unit() == Unit::Length && !fit.fitting.measurements.leading().is_position() {
+    let kind = fit.table().leading().kind();
+    if parameter.unit() == Unit::Length && !fit.table().leading().is_position() {
         let scale = if kind == Observation::Pixel(0, 0, 0).kind() {
             "check the points of the marker, such as the size of its squares"
         } else if !fit.problem.distances.is_empty() {
@@ -250,7 +250,7 @@ fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String
     in_words.or_else(|| {
         let x = fitted_deviation(fit, parameter)?.abs();
         let is_small = match parameter.unit() {
-            Unit::Length => x < MAX_BUILT_DEVIATION * fit.fitting.model.reach(),
+            Unit::Length => x < MAX_BUILT_DEVIATION * fit.model().reach(),
             Unit::Angle => x < MAX_BUILT_DEVIATION,
             _ => false,
         };
@@ -275,7 +275,7 @@ fn euler_remedy(fit: &CheckedFit, base: usize) -> Option<String> {
     let read = Frame::from_xyz_rpy(&Vector3::zeros(), &declared);
     let angle =
         |one: &Frame<f64>, other: &Frame<f64>| rotation_between(&one.axes, &other.axes).norm();
-    let bases = fit.fitting.model.base_frames(fit.end.x.as_slice());
+    let bases = fit.model().base_frames(fit.end.x.as_slice());
     let fitted = bases.get(base)?;
     let is_read = angle(&read, fitted) < MAX_EULER_MISMATCH;
     let is_other = angle(&read, &frame(&declared)) > 2.0 * MAX_EULER_MISMATCH;
@@ -301,7 +301,7 @@ fn euler_remedy(fit: &CheckedFit, base: usize) -> Option<String> {
 /// Checks that no parameter deviates from nominal by more than is possible on this arm. Limits are
 /// its reach for a length, half a turn for an angle, and a factor of 100 for a stiffness.
 pub(super) fn within_arm_size(fit: &CheckedFit) -> Option<Finding> {
-    let model = fit.fitting.model;
+    let model = fit.model();
     let ratio =
         |parameter: &Parameter, x: f64| Some(x.abs() / largest_deviation(model, parameter)?);
     let finding = |(parameter, sizes): (&Parameter, f64)| {
@@ -329,7 +329,7 @@ const MAX_NEGATIVE_SIGMAS: f64 = 5.0;
 /// negative by more than [`MAX_NEGATIVE_SIGMAS`] standard errors.
 pub(super) fn gives_way_to_loads(fit: &CheckedFit) -> Option<Finding> {
     let of_unknown = |(place, &k): (usize, &usize)| {
-        let parameter = &fit.fitting.model.parameters[k];
+        let parameter = &fit.model().parameters[k];
         let ParameterSite::Joint { joint, field: JointField::Compliance } = parameter.site else {
             return None;
         };
@@ -378,7 +378,7 @@ fn largest_ratio<'a>(
 ) -> Option<(&'a Parameter, f64)> {
     // Parameters that only held-out rows use are not fitted.
     let later = &fit.fitting.held_out_only.parameters;
-    let parameters = fit.fitting.model.parameters.iter().zip(&fit.end.x).zip(later);
+    let parameters = fit.model().parameters.iter().zip(&fit.end.x).zip(later);
     let fitted = parameters.filter(|(_, later)| !**later).map(|(fitted, _)| fitted);
     let ratios = fitted.filter_map(|(parameter, &x)| Some((parameter, ratio(parameter, x)?)));
     ratios.max_by(|a, b| a.1.total_cmp(&b.1))

@@ -22,10 +22,9 @@ const MIN_ROWS: usize = 3;
 
 /// Checks that every joint moves in the fitted rows, and that not all poses are alike.
 pub(super) fn poses_spread(fit: &CheckedFit) -> Option<Finding> {
-    let table = fit.fitting.measurements;
+    let table = fit.table();
     let is_of_arm = |row: &&usize| table.observation(**row).is_of_arm();
-    let rows: Vec<usize> =
-        fit.fitting.split.identification.iter().filter(is_of_arm).copied().collect();
+    let rows: Vec<usize> = fit.rows().iter().filter(is_of_arm).copied().collect();
     // If the fit is far off, a joint that stands still is a column in doubt.
     if rows.len() < MIN_ROWS || !misfit(fit).is_empty() {
         return None;
@@ -37,7 +36,7 @@ pub(super) fn poses_spread(fit: &CheckedFit) -> Option<Finding> {
     };
     let is_turning = |joint: usize| fit.turns(joint);
     let is_narrow = |joint: usize| {
-        let reach = fit.fitting.model.reach();
+        let reach = fit.model().reach();
         range(joint) < if is_turning(joint) { MAX_ALIKE_TURN } else { MAX_ALIKE_TRAVEL * reach }
     };
     let mut joints: Vec<usize> = moving(fit).collect();
@@ -64,7 +63,7 @@ pub(super) fn poses_spread(fit: &CheckedFit) -> Option<Finding> {
         joints.pop();
     }
     let still = still_joints(fit, &rows, &joints);
-    let Some(&first) = still.first() else { return None };
+    let &first = still.first()?;
     let names: Vec<String> = still.iter().map(|&joint| column_name(table, joint)).collect();
     let at = table.configuration(rows[0])[first];
     let place = match still.len() {
@@ -84,8 +83,8 @@ pub(super) fn poses_spread(fit: &CheckedFit) -> Option<Finding> {
 /// Returns true if the joint at index `joint` moves what one of the `rows` measures: a target that
 /// is not on its axis, or a marker in the image of a camera.
 fn moves_target(fit: &CheckedFit, rows: &[usize], joint: usize) -> bool {
-    let table = fit.fitting.measurements;
-    let model = fit.fitting.model;
+    let table = fit.table();
+    let model = fit.model();
     // Frame i is behind joint i, counted from 1; frame 0 is the base.
     let is_behind = |carrier: Option<usize>| carrier.is_some_and(|frame| frame > joint);
     let moves_view = |row: &usize| {

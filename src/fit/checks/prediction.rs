@@ -11,7 +11,7 @@ use super::row_kind::{format_error, row_noun};
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::noise::Noise;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
-use crate::numeric::parallel;
+use crate::numeric::{parallel, spaced};
 use crate::problem::Observation;
 
 /// p-value of the held-out residuals below which they contradict the prediction.
@@ -40,18 +40,12 @@ pub(super) fn prediction_holds(fit: &CheckedFit) -> Option<Finding> {
     let is_outlier = |row: usize| fit.held_out_outliers.iter().any(|outlier| outlier.row == row);
     let held_out = fit.fitting.split.held_out.iter().copied();
     let rows: Vec<usize> = held_out.filter(|row| !is_outlier(*row)).collect();
-    let step = rows.len().div_ceil(MAX_TESTED_ROWS).max(1);
-    let rows: Vec<usize> = rows.into_iter().step_by(step).collect();
-    let Some((chi2, coordinates)) =
-        predictive_chi2(fit.fitting, &rows, &fit.end.x, &fit.whole.unknowns, fit.covariance)
-    else {
-        return None;
-    };
+    let rows = spaced(rows, MAX_TESTED_ROWS);
+    let (chi2, coordinates) =
+        predictive_chi2(fit.fitting, &rows, &fit.end.x, &fit.whole.unknowns, fit.covariance)?;
     let dof = fit.whole.count() as f64 - fit.whole.unknowns.len() as f64;
     let is_estimated = fit.noise != Noise::Declared || (fit.noise_factor - 1.0).abs() > 1e-9;
-    let Some((p_value, limit)) = upper_tail(chi2, coordinates, is_estimated.then_some(dof)) else {
-        return None;
-    };
+    let (p_value, limit) = upper_tail(chi2, coordinates, is_estimated.then_some(dof))?;
     if p_value >= MAX_CHANCE_PROBABILITY {
         return None;
     }
@@ -63,7 +57,7 @@ pub(super) fn prediction_holds(fit: &CheckedFit) -> Option<Finding> {
     let numbers = [chi2.into(), coordinates.into(), p_value.into()];
     let finding = Finding::new(FindingCode::HeldOutBeyondPrediction, numbers, text);
     let leading = fit.leading();
-    let errors = fit.fitting.position_errors(&rows, &fit.end.x);
+    let errors = fit.errors_at(&rows, &fit.end.x);
     Some(
         finding.with_remedy_of(
             mistake(fit, &leading, (&rows, &errors))

@@ -101,12 +101,12 @@ pub(super) fn noise_is_declared(fit: &CheckedFit) -> Option<Finding> {
     let finding = Finding::new(FindingCode::NoiseBeyondDeclared, numbers, text);
     Some(if UNIT_RATIOS.contains(&ratio) {
         finding.with_remedy("the declared σ may be in another unit: check it")
-    } else if fit.fitting.measurements.lacks_payload(fit.problem) {
+    } else if fit.table().lacks_payload(fit.problem) {
         let remedy = "the table has no column payload_kg, although [tool] says where a payload \
                       hangs: add the column, or remove payload_at";
         finding.with_remedy(remedy)
     } else {
-        let kind = fit.fitting.measurements.leading().kind();
+        let kind = fit.table().leading().kind();
         finding.with_remedy(format!(
             "look for what the model lacks with flexcal loop, or check the unit and the size of the \
              declared σ (the residual is like that of an instrument with σ = {})",
@@ -132,7 +132,7 @@ const MIN_NUMBERS_PER_PARAMETER: usize = 2;
 /// Checks that the declared σ of the leading kind of rows (positions, if there are any) is not far
 /// above the rms residual of the fit.
 pub(super) fn sigma_is_not_overstated(fit: &CheckedFit) -> Option<Finding> {
-    let measurements = fit.fitting.measurements;
+    let measurements = fit.table();
     let kind = fit.kind(measurements.leading());
     let sigma = kind.declared_sigma?;
     let rms = fit.rms_at(&kind.rows, &fit.end.x) / kind.observation.expected_norm();

@@ -46,8 +46,16 @@ pub(super) fn spread(
 /// Names of the coordinates of a position.
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Joins the first `max` words by commas and states how many others there are: "a, b and 3 more".
-pub(super) fn listed(words: &[impl AsRef<str>], max: usize) -> String {
+/// Maximum number of rows or limits that a text lists.
+pub(super) const MAX_LISTED: usize = 3;
+
+/// Joins the first words by commas and states how many others there are: "a, b, c and 4 more".
+pub(super) fn listed(words: &[impl AsRef<str>]) -> String {
+    listed_up_to(words, MAX_LISTED)
+}
+
+/// Does the work of [`listed`] for the first `max` words.
+pub(super) fn listed_up_to(words: &[impl AsRef<str>], max: usize) -> String {
     let shown: Vec<&str> = words.iter().take(max).map(AsRef::as_ref).collect();
     let more = words.len().saturating_sub(max);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };

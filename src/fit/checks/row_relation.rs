@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use rand::seq::SliceRandom as _;
 
 use super::checked_fit::CheckedFit;
+use crate::numeric::spaced;
 use crate::random;
 
 /// Maximum number of rows, evenly spaced, whose pairs are regressed.
@@ -46,17 +47,16 @@ struct Pairs {
 /// Returns the joints whose columns the measured positions do not depend on although those that the
 /// nominal arm predicts do: all of the `joints`, or one of them.
 pub(super) fn other_rows(fit: &CheckedFit, joints: &[usize]) -> Option<OtherRows> {
-    let measurements = fit.fitting.measurements;
+    let measurements = fit.table();
     let kind = fit.kind(measurements.leading());
-    let step = kind.rows.len().div_ceil(MAX_ROWS).max(1);
-    let rows: Vec<usize> = kind.rows.iter().copied().step_by(step).collect();
+    let rows = spaced(kind.rows, MAX_ROWS);
     if rows.len() < MIN_ROWS || joints.is_empty() {
         return None;
     }
     let poses = fit.fitting.poses(&rows);
     // Fitted to other rows, a free target would move to where joints have no effect.
     let nominal = fit.fitting.located();
-    let predicted = fit.fitting.model.predicted_targets(&poses, nominal.as_slice());
+    let predicted = fit.model().predicted_targets(&poses, nominal.as_slice());
     let measured: Vec<Vector3<f64>> = rows.iter().map(|&row| measurements.positions[row]).collect();
     let is_turning = |joint: usize| fit.turns(joint);
     // Distances between rows of different bases depend on where these stand.

@@ -133,11 +133,11 @@ fn upper_tail(z: f64) -> f64 {
 /// Checks that the rows which a robust loss treats as outliers are a random selection, which does
 /// not depend on time, session, a joint or a load.
 pub(super) fn set_aside_by_chance(fit: &CheckedFit) -> Option<Finding> {
-    let rows = &fit.fitting.split.identification;
+    let rows = fit.rows();
     if fit.fitting.loss == Loss::Squares {
         return None;
     }
-    let found = selection(fit.fitting.measurements, rows, fit.outliers);
+    let found = selection(fit.table(), rows, fit.outliers);
     let finding = |Selection { quantity, p_value }: Selection| {
         let (count, of) = (fit.outliers.len(), rows.len());
         let text = format!(

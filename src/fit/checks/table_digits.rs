@@ -8,6 +8,7 @@ use super::checked_fit::CheckedFit;
 use super::doubted_columns::column_name;
 use super::finding::{Finding, FindingCode};
 use super::row_kind::{RowKind, format_error};
+use crate::numeric::levels;
 
 /// Largest rms error of the registered nominal arm, relative to its reach, at which the positions
 /// of the table were computed. Errors of built arms are a hundred times as large.
@@ -46,7 +47,7 @@ pub(super) fn positions_are_measured(fit: &CheckedFit) -> Option<Finding> {
     let RowKind { observation, rows, declared_sigma, .. } = fit.leading();
     let placed = fit.fitting.placements().len();
     let rms = fit.registered.identification.rms.norm;
-    let limit = MAX_COMPUTED_ERROR * fit.fitting.model.reach();
+    let limit = MAX_COMPUTED_ERROR * fit.model().reach();
     let is_below_noise = declared_sigma.is_none_or(|sigma| rms < MAX_COMPUTED_SIGMAS * sigma);
     let is_computed = observation.is_position()
         && 3 * rows.len() > MIN_COORDINATES * placed.max(1)
@@ -80,7 +81,7 @@ pub(super) fn commands_have_digits(fit: &CheckedFit) -> Option<Finding> {
         return None;
     }
     let poses = fit.fitting.poses(&kind.rows);
-    let slopes = fit.fitting.model.command_jacobian(fit.problem, poses, &fit.end.x);
+    let slopes = fit.model().command_jacobian(fit.problem, poses, &fit.end.x);
     // A number that is rounded to a step errs by a uniform distribution of variance step²/12.
     let squares = |(joint, step): &(usize, f64)| {
         let lever: f64 = slopes.iter().map(|slope| slope.column(*joint).norm_squared()).sum();
@@ -112,7 +113,7 @@ fn rounded_alone(
     (steps, slopes): (&[(usize, f64)], &[DMatrix<f64>]),
     (rounding, rms): (f64, f64),
 ) -> Option<Finding> {
-    let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
+    let errors = fit.errors_at(&kind.rows, &fit.end.x);
     let [(joint, step)] = *steps else { return None };
     let (mut along, mut all, mut within) = (0.0, 0.0, 0);
     for (error, slope) in errors.iter().zip(slopes) {
@@ -125,7 +126,7 @@ fn rounded_alone(
     if along < MIN_SHARE_ALONG * all || (within as f64) < MIN_SHARE_WITHIN * errors.len() as f64 {
         return None;
     }
-    let name = column_name(fit.fitting.measurements, joint);
+    let name = column_name(fit.table(), joint);
     let text = format!(
         "column {name} holds multiples of {}° alone, unlike the other joints; such rounding moves \
          the target by {} rms, as large as the residual of {}, which lies along this joint's motion",
@@ -146,11 +147,9 @@ fn revolute_joints<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f 
 /// Returns the largest trial step \[rad\] of which all commands of a joint are multiples; `None` if
 /// they are multiples of no trial step, or if too few commands differ.
 fn command_step(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<f64> {
-    let measurements = fit.fitting.measurements;
+    let measurements = fit.table();
     let command = |&row: &usize| measurements.configurations[row * measurements.joints + joint];
-    let mut degrees: Vec<f64> = rows.iter().map(|row| command(row).to_degrees()).collect();
-    degrees.sort_by(f64::total_cmp);
-    degrees.dedup();
+    let degrees = levels(rows.iter().map(|row| command(row).to_degrees()));
     if degrees.len() < MIN_COMMANDS {
         return None;
     }

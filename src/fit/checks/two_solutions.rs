@@ -34,7 +34,7 @@ fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Option<Fi
     let x = &fit.end.x;
     let most = distance(fit.whole, fit.statistics, x, &second.x)?.unknown;
     let k = fit.whole.unknowns[most];
-    let parameter = &fit.fitting.model.parameters[k];
+    let parameter = &fit.model().parameters[k];
     let name = &parameter.name;
     let error = parameter.value_error(x[k], fit.statistics.errors[most]);
     let [estimate, other] = [x, &second.x].map(|x| parameter.value(x[k]));
@@ -47,7 +47,7 @@ fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Option<Fi
         shown(parameter, estimate, error),
         about_three_digits(second.excess.max(0.0)),
     );
-    let is_position = fit.fitting.measurements.leading().is_position();
+    let is_position = fit.table().leading().is_position();
     let told = if is_position { most_different(fit, &second.x) } else { None };
     let numbers = [
         json!(name),
@@ -99,8 +99,8 @@ fn words(fit: &CheckedFit, configuration: &[f64]) -> String {
 /// of the fitted arm and of the one with the full parameter vector `other` are farthest apart, with
 /// their distance \[m\]. `None` if no configuration has an equilibrium.
 fn most_different(fit: &CheckedFit, other: &DVector<f64>) -> Option<(Vec<f64>, f64)> {
-    let measurements = fit.fitting.measurements;
-    let first = *fit.fitting.split.identification.first()?;
+    let measurements = fit.table();
+    let first = *fit.rows().first()?;
     let template = *fit.fitting.poses(&[first]).first()?;
     let range = |(k, (low, high)): (usize, (f64, f64))| {
         let commands = || (0..measurements.len()).map(|row| measurements.configuration(row)[k]);
@@ -123,7 +123,7 @@ fn most_different(fit: &CheckedFit, other: &DVector<f64>) -> Option<(Vec<f64>, f
         })
         .collect();
     let [here, there] =
-        [&fit.end.x, other].map(|x| fit.fitting.model.predicted_targets(&poses, x.as_slice()));
+        [&fit.end.x, other].map(|x| fit.model().predicted_targets(&poses, x.as_slice()));
     let apart = here.iter().zip(&there).map(|(a, b)| (a - b).norm());
     let (best, apart) = apart
         .enumerate()

@@ -310,6 +310,11 @@ impl<'a> Fitting<'a> {
         self.split.identification.iter().copied().filter(leads).collect()
     }
 
+    /// Returns the end of the fit from the registered nominal arm; `None` if it fails.
+    pub fn refitted(&self) -> Option<FitEnd> {
+        self.run(&self.registered().ok()?).ok()
+    }
+
     /// Runs the stages of the strategy from `start`; several stages are repeated in turn until the
     /// cost converges.
     pub fn run(&self, start: &DVector<f64>) -> Result<FitEnd, StageError> {

@@ -2,15 +2,25 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::fit::stages::fitting::Fitting;
+use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::least_squares::{Triangle, jacobian_and_residual};
 use crate::numeric::parallel;
+use crate::problem::Problem;
 
 /// Ridge on the diagonal of JᵀJ + Λ, as a fraction of the entry of JᵀJ there. Combinations that
 /// only one configuration determines then keep their fitted values if that one is left out.
 const RIDGE: f64 = 1e-9;
 
 impl Fitting<'_> {
+    /// Returns the [`left_out_errors`](Self::left_out_errors) at the end of a fit, in which the
+    /// parameters that rest on a bound are held. `problem` is that of the model.
+    pub fn left_out(&self, end: &FitEnd, problem: &Problem) -> Vec<Vector3<f64>> {
+        let whole = self.whole();
+        let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
+        let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();
+        self.left_out_errors(&end.x, &unknowns, &self.measurements.configurations(problem).0)
+    }
+
     /// Returns the error measured − predicted of each identification row, in the order of these
     /// rows, measuring frame \[m\]. Each row is predicted by a fit without its configuration, which
     /// is linearised at the full parameter vector `x`.

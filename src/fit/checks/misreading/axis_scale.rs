@@ -1,7 +1,8 @@
 //! Search for the scale of one coordinate of the positions against the two others.
 
-use super::Misreading;
 use super::search::Trial;
+use super::{Kind, Misreading};
+use crate::fit::checks::row_kind::AXES;
 
 /// Distances of the two trial ratios beside a ratio from it, relative to it: twice with the
 /// registered nominal arm, then with full fits.
@@ -17,12 +18,17 @@ impl Trial<'_> {
     /// error is smallest: the minimum of the parabola through three ratios, several times. Other
     /// misreadings stay as they are.
     pub(super) fn with_best_ratio(&self, misreading: Misreading) -> Misreading {
-        let Misreading::AxisScale { axis, millionths } = misreading else { return misreading };
+        let Kind::AxisScale(axis, millionths) = misreading.kind else { return misreading };
         let mut ratio = f64::from(millionths);
         for (step, is_fitted) in STEPS {
             let square = |side: f64| {
                 let scaled = Misreading::axis_scale(axis, ratio * (1.0 + side * step));
-                Some(self.outcome(scaled, is_fitted)?.rms.powi(2))
+                let error = if is_fitted {
+                    self.outcome(&scaled)?.rms
+                } else {
+                    self.registered_error(&scaled)?
+                };
+                Some(error.powi(2))
             };
             let (Some(below), Some(here), Some(above)) = (square(-1.0), square(0.0), square(1.0))
             else {
@@ -40,13 +46,25 @@ impl Trial<'_> {
 
 impl Misreading {
     /// Returns true for a scale of one coordinate that an instrument may have.
-    pub(super) fn is_minute(self) -> bool {
-        matches!(self, Self::AxisScale { millionths, .. } if millionths.abs_diff(1_000_000) < MIN_SCALE)
+    pub(super) fn is_minute(&self) -> bool {
+        matches!(self.kind, Kind::AxisScale(_, of) if of.abs_diff(1_000_000) < MIN_SCALE)
+    }
+
+    /// Creates the misreading of the scale of a coordinate by the nearest ratio in millionths.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "near 1e6")]
+    fn axis_scale(axis: usize, millionths: f64) -> Self {
+        Self::of_axis_scale(axis, millionths.clamp(1.0, 1e9).round() as u32)
     }
 
     /// Creates the misreading of the scale of a coordinate by a ratio in millionths.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "near 1e6")]
-    fn axis_scale(axis: usize, millionths: f64) -> Self {
-        Self::AxisScale { axis, millionths: millionths.clamp(1.0, 1e9).round() as u32 }
+    pub(super) fn of_axis_scale(axis: usize, millionths: u32) -> Self {
+        let name = AXES[axis];
+        let ratio = f64::from(millionths) * 1e-6;
+        let words =
+            format!("{name} of the positions that is {ratio:.4} times as large as it should be");
+        let factor = 1e6 / f64::from(millionths);
+        Self::of_positions(words, move |position| position[axis] *= factor)
+            .of_kind(Kind::AxisScale(axis, millionths))
+            .in_group(format!("scale of {name}"))
     }
 }

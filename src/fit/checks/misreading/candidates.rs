@@ -1,108 +1,175 @@
 //! Candidates: the misreadings that a problem and the columns of its table allow.
 
-use std::f64::consts::PI;
-
-use super::commands::{TURN_UNITS, of_commands, of_mixed_units, turns_in};
-use super::{MassScale, Misreading, POSITION_UNITS};
+use super::commands::{of_commands, of_joint_units};
+use super::entries::{MIN_MILLIMETRE_LENGTH, lengths_of, of_joint_table};
+use super::loads::of_loads;
+use super::{Kind, Misreading, counted, power_of_ten};
+use crate::fit::checks::row_kind::AXES;
 use crate::measurement::Measurements;
-use crate::model::parameter::JointField;
-use crate::problem::{Joint, JointKind, Problem};
+use crate::problem::{Effect, ParameterRule, Problem};
 
+/// Units of positions that are taken for millimetres: length \[mm\] and name.
+pub(in crate::fit) const POSITION_UNITS: [(f64, &str); 7] = [
+    (25.4, "inches"),
+    (10.0, "centimetres"),
+    (1e-3, "micrometres"),
+    (0.1, "tenths of a millimetre"),
+    (0.01, "hundredths of a millimetre"),
+    (100.0, "decimetres"),
+    (304.8, "feet"),
+];
 /// Trial ratios of one coordinate of the positions to the two others, in millionths.
 const TRIAL_RATIOS: [u32; 8] =
     [800_000, 900_000, 950_000, 980_000, 1_020_000, 1_050_000, 1_100_000, 1_250_000];
-/// Smallest absolute angle of the joint table, as a number of degrees, that may be meant in
-/// radians.
-const MIN_RADIANS: f64 = 0.3;
-/// Range of plausible lengths of a joint \[m\]. A length is tried in another unit if it is then in
-/// this range.
-const PLAUSIBLE_LENGTHS: std::ops::Range<f64> = 0.01..3.0;
-/// Maximum number of masses that are tried one by one.
-const MAX_MASSES: usize = 12;
-/// Scales of masses that leave an error far beyond the noise.
-const GROSS_MASS_SCALES: [MassScale; 4] =
-    [MassScale::Power(-3), MassScale::Power(-1), MassScale::Power(1), MassScale::Power(3)];
-/// Scales of masses that an arm with compliances nearly makes up for.
-pub(super) const MASS_SCALES: [MassScale; 4] =
-    [MassScale::Power(-1), MassScale::Power(1), MassScale::Pounds, MassScale::Newtons];
-/// Smallest coordinate of a centre of mass whose sign is doubted \[m\].
-const MIN_CENTRE: f64 = 0.02;
-/// Number of joints before and after the declared carrier of a target, camera or marker that are
-/// tried as its carrier.
-pub(super) const MAX_OTHER_CARRIERS: usize = 2;
 /// Trial ratios of the measured lengths to those of the arm, in hundredths. A full fit finds values
 /// between them.
 const TRIAL_SCALES: [i16; 8] = [80, 90, 95, 98, 102, 105, 110, 125];
-/// Trial errors of an angle α of the joint table \[°\]. For α = ±90°, an error of 180° is the same
-/// as the other sign, which is tried anyway.
-const TWISTS: [i16; 3] = [-90, 90, 180];
+/// Number of joints before and after the declared carrier of a target, camera or marker that are
+/// tried as its carrier.
+pub(super) const MAX_OTHER_CARRIERS: usize = 2;
 /// Maximum number of rows by which positions are tried as shifted, in either direction.
 const MAX_SHIFT: i8 = 3;
 /// Number of rows, evenly spaced, at which a trial shift of positions begins.
 const SHIFT_PLACES: usize = 12;
 
-/// Declared length \[m\] above which a number may be in millimetres instead.
-pub(super) const MIN_MILLIMETRE_LENGTH: f64 = 1.0;
-
 /// Returns every misreading that the problem and its table allow.
 pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
-    let turns =
-        |radians| (0..problem.joints.len()).any(|joint| turns_in(problem, table, joint, radians));
-    let lengths = |metres| table.position_unit.is_none_or(|unit| (unit >= 1.0) == metres);
-    let long = problem.joints.iter().any(|joint| {
-        lengths_of(&mut joint.clone()).iter().any(|length| length.abs() > MIN_MILLIMETRE_LENGTH)
+    let mut units = of_joint_units(problem, table);
+    units.extend(of_units(table));
+    units.extend(of_table_units());
+    units.extend(of_axes(table));
+    let inverse = "poses that are inverse (of the measuring frame in the frame of the target; invert \
+                   each 4 × 4 matrix)";
+    let inverse = Misreading::of_rows(inverse, |rows| {
+        let turns = rows.orientations.iter_mut().flatten();
+        for (position, turn) in rows.positions.iter_mut().zip(turns) {
+            *turn = turn.inverse();
+            *position = -(*turn * *position);
+        }
     });
-    let mut units = Vec::new();
-    units.extend(turns(true).then_some(Misreading::Degrees));
-    units.extend(turns(false).then_some(Misreading::Radians));
-    if turns(false) {
-        units.extend(TURN_UNITS.map(|per_turn| Misreading::TurnUnit { per_turn }));
-    }
-    units.extend(of_mixed_units(problem, table));
-    units.extend(of_slides(problem, table));
-    units.extend(lengths(false).then_some(Misreading::Metres));
-    units.extend(lengths(true).then_some(Misreading::Millimetres));
-    // Where the declared unit is not known, micrometres are millimetres taken for metres.
-    let is_other = |unit: &usize| !lengths(true) || POSITION_UNITS[*unit].1 != "micrometres";
-    let others = (0..POSITION_UNITS.len()).filter(|_| lengths(false)).filter(is_other);
-    units.extend(others.map(|unit| Misreading::PositionUnit { unit }));
-    let of_table =
-        |unit| [true, false].map(|has_targets| Misreading::TableUnit { unit, has_targets });
-    // No sheet states lengths of an arm in micrometres.
-    let of_sheet = |unit: &usize| POSITION_UNITS[*unit].1 != "micrometres";
-    units.extend((0..POSITION_UNITS.len()).filter(of_sheet).flat_map(of_table));
-    let powers = if lengths(false) { [3, 1] } else { [-3, -2] };
-    let of_axis = |axis: usize| powers.map(|power| Misreading::AxisUnit { axis, power });
-    units.extend((0..3).flat_map(of_axis));
-    if lengths(false) {
-        units.extend((0..3).map(|axis| Misreading::AxisInches { axis }));
-    }
-    let scaled = |axis: usize| TRIAL_RATIOS.map(|ratio| (axis, ratio));
-    let scaled = (0..3).flat_map(scaled);
-    units.extend(scaled.map(|(axis, millionths)| Misreading::AxisScale { axis, millionths }));
-    units.push(Misreading::Mirrored { axes: None });
-    units.extend(TRIAL_SCALES.map(|percent| Misreading::Scale { percent }));
-    units.extend(table.orientations.is_some().then_some(Misreading::InversePose));
-    units.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
-    units.extend(long.then_some(Misreading::ArmInMillimetres));
-    units.extend(of_commands(problem, table));
+    units.extend(table.orientations.is_some().then_some(inverse));
+    let target = "a target of [tool] that is in millimetres, declared in metres";
+    let target = Misreading::of_problem(target, |problem| {
+        shrink_target(problem);
+        Some(())
+    });
+    units.extend(is_far(problem).then_some(target));
+    units.extend(arm_in_millimetres(problem));
+    units.extend(of_commands(problem));
     units.extend(of_order(table));
-    units.extend(of_text_order(table));
+    units.extend(of_whole_order(table));
     units.extend(of_joint_table(problem));
     units.extend(of_loads(problem, table));
     units.extend(of_targets(problem));
     units
 }
 
-/// Returns the misreadings of the unit of sliding joints.
-fn of_slides(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
-    let slides = |joint: usize| {
-        problem.joints.get(joint).is_some_and(|joint| joint.command_kind() == JointKind::Prismatic)
+/// Returns the misreadings of joint columns and joint table alone.
+pub(super) fn of_arm(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
+    let mut misreadings = of_joint_units(problem, table);
+    misreadings.extend(of_table_units());
+    misreadings.extend(arm_in_millimetres(problem));
+    misreadings.extend(of_commands(problem));
+    misreadings.extend(of_joint_table(problem));
+    misreadings
+}
+
+/// Returns the misreading that long lengths of joints are in millimetres, declared in metres, with
+/// the target; `None` if all are short.
+fn arm_in_millimetres(problem: &Problem) -> Option<Misreading> {
+    let words = "lengths of joints that are in millimetres, declared in metres";
+    let is_long = |length: &f64| length.abs() > MIN_MILLIMETRE_LENGTH;
+    let mut lengths = problem.joints.iter().cloned();
+    let has_long = lengths.any(|mut joint| lengths_of(&mut joint).iter().any(|of| is_long(of)));
+    let misreading = Misreading::of_problem(words, move |problem| {
+        let lengths = problem.joints.iter_mut().flat_map(lengths_of);
+        lengths.filter(|length| is_long(length)).for_each(|length| *length *= 1e-3);
+        shrink_target(problem);
+        Some(())
+    });
+    has_long.then_some(misreading)
+}
+
+/// Returns true if the columns of positions were read in metres, or in millimetres if `metres` is
+/// false. Returns true for both if the unit is not known.
+fn are_in(table: &Measurements, metres: bool) -> bool {
+    table.position_unit.is_none_or(|unit| (unit >= 1.0) == metres)
+}
+
+/// Returns the misreadings of the unit of all positions.
+fn of_units(table: &Measurements) -> Vec<Misreading> {
+    let unit = |words: &str, factor: f64, kind: fn(f64) -> Kind| {
+        let words = format!("positions that are {words}");
+        Misreading::of_positions(words, move |at| *at *= factor).of_kind(kind(factor))
     };
-    let columns = table.command_columns.iter().filter(|column| slides(column.joint));
-    let units: Vec<bool> = columns.map(|column| column.unit >= 1.0).collect();
-    let power = |&is_metres: &bool| if is_metres { -3 } else { 3 };
-    units.first().map(power).map(|power| Misreading::Slides { power }).into_iter().collect()
+    let mut units = Vec::new();
+    if are_in(table, false) {
+        units.push(unit("metres, declared as millimetres", 1e3, Kind::UsualUnit));
+    }
+    if are_in(table, true) {
+        units.push(unit("millimetres, declared as metres", 1e-3, Kind::UsualUnit));
+    }
+    for (factor, name) in POSITION_UNITS.into_iter().filter(|_| are_in(table, false)) {
+        // Where the declared unit is not known, micrometres are millimetres taken for metres.
+        if !are_in(table, true) || name != "micrometres" {
+            let kind = if name == "inches" { Kind::UsualUnit } else { Kind::Unit };
+            units.push(unit(&format!("{name}, declared as millimetres"), factor, kind));
+        }
+    }
+    units
+}
+
+/// Returns the misreadings of the unit of all lengths of the joint table.
+fn of_table_units() -> impl Iterator<Item = Misreading> {
+    // No sheet states lengths of an arm in micrometres.
+    let units = POSITION_UNITS.into_iter().filter(|(_, name)| *name != "micrometres");
+    let units = units.flat_map(|unit| [(unit, true), (unit, false)]);
+    units.map(|((factor, name), has_targets)| {
+        let targets = if has_targets { " and of the target" } else { "" };
+        let words = format!(
+            "lengths of the joint table{targets} that are in {name}, declared as millimetres \
+             (multiply them by {factor})"
+        );
+        let of_table = Misreading::of_problem(words, move |problem| {
+            let lengths = problem.joints.iter_mut().flat_map(lengths_of);
+            lengths.for_each(|length| *length *= factor);
+            if has_targets {
+                problem.tool.target *= factor;
+                problem.targets.iter_mut().for_each(|target| target.at *= factor);
+            }
+            Some(())
+        });
+        of_table.in_group("unit of the joint table")
+    })
+}
+
+/// Returns the misreadings of the axes of positions, and of the scale of all.
+fn of_axes(table: &Measurements) -> Vec<Misreading> {
+    let of_axis = |words: String, axis: usize, factor: f64| {
+        Misreading::of_positions(words, move |position| position[axis] *= factor)
+    };
+    let in_millimetres = are_in(table, false);
+    let powers = if in_millimetres {
+        [(3, "metres", "millimetres"), (1, "centimetres", "millimetres")]
+    } else {
+        [(-3, "millimetres", "metres"), (-2, "centimetres", "metres")]
+    };
+    let mut units = Vec::new();
+    for (axis, name) in AXES.into_iter().enumerate() {
+        units.extend(powers.map(|(power, found, declared)| {
+            let words = format!("{name} alone that is in {found}, declared in {declared}");
+            of_axis(words, axis, power_of_ten(power)).in_group(format!("unit of {name}"))
+        }));
+    }
+    for (axis, name) in AXES.into_iter().enumerate().filter(|_| in_millimetres) {
+        let words = format!("{name} alone that is in inches, declared in millimetres");
+        units.push(of_axis(words, axis, POSITION_UNITS[0].0));
+    }
+    let ratios = |axis| TRIAL_RATIOS.map(|millionths| Misreading::of_axis_scale(axis, millionths));
+    units.extend((0..3).flat_map(ratios));
+    units.push(Misreading::mirrored(None));
+    units.extend(TRIAL_SCALES.map(Misreading::of_scale));
+    units
 }
 
 /// Returns the misreadings of targets: a target on the frame of another joint near the declared
@@ -113,13 +180,44 @@ fn of_targets(problem: &Problem) -> Vec<Misreading> {
     } else {
         problem.targets.iter().map(|target| target.joint).collect()
     };
+    let name = |target: usize| problem.targets.get(target).map(|of| of.name.clone());
     let mut misreadings = Vec::new();
     for (target, &carrier) in carriers.iter().enumerate() {
         let others = carrier.saturating_sub(MAX_OTHER_CARRIERS)..=carrier + MAX_OTHER_CARRIERS;
         let others = others.filter(|&joint| joint != carrier && joint < problem.joints.len());
-        misreadings.extend(others.map(|joint| Misreading::Carrier { target, joint: joint + 1 }));
-        let later = target + 1..problem.targets.len();
-        misreadings.extend(later.map(|with| Misreading::ExchangedTargets { target, with }));
+        misreadings.extend(others.map(|joint| {
+            let frame = format!("on the frame of joint {0} (joint = {0})", joint + 1);
+            let located = name(target).map(|name| format!("the target \"{name}\" {frame}"));
+            let correct = move |problem: &mut Problem| {
+                match problem.targets.get_mut(target) {
+                    Some(target) => target.joint = joint,
+                    None => problem.tool.joint = joint,
+                }
+                Some(())
+            };
+            Misreading::of_problem(format!("the target {frame}"), correct).located(located)
+        }));
+        for with in target + 1..problem.targets.len() {
+            let names = [target, with].map(|target| name(target).unwrap_or_default());
+            let located = format!(
+                "the words \"{}\" and \"{}\" exchanged in the column target",
+                names[0], names[1]
+            );
+            let exchanged = Misreading::of_rows("two targets that are exchanged", move |rows| {
+                let Some(words) = &mut rows.target else { return };
+                let place = |name: &String| words.names.iter().position(|word| word == name);
+                if let (Some(first), Some(second)) = (place(&names[0]), place(&names[1])) {
+                    for word in &mut words.of_row {
+                        *word = match *word {
+                            word if word == first => second,
+                            word if word == second => first,
+                            word => word,
+                        };
+                    }
+                }
+            });
+            misreadings.push(exchanged.located(Some(located)));
+        }
     }
     misreadings
 }
@@ -130,37 +228,60 @@ pub(super) fn is_far(problem: &Problem) -> bool {
     problem.targets.is_empty() && problem.tool.target.norm() > MIN_MILLIMETRE_LENGTH
 }
 
+/// Reads a target of `[tool]` that [`is_far`] in millimetres.
+fn shrink_target(problem: &mut Problem) {
+    if is_far(problem) {
+        problem.tool.target *= 1e-3;
+    }
+}
+
 /// Returns the misreadings in which positions are shifted by rows against the configurations.
 pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     let shifts = (-MAX_SHIFT..=MAX_SHIFT).filter(|&by| by != 0);
     let step = shift_step(table.len());
     let places = (0..table.len()).step_by(step).take(SHIFT_PLACES);
-    let of_place = |from: usize| shifts.clone().map(move |by| Misreading::Shifted { by, from });
+    let of_place = |from: usize| shifts.clone().map(move |by| Misreading::shifted(by, from));
     places.flat_map(of_place).collect()
 }
 
 /// Returns the misreadings of the order of all rows: one of two joined tables is sorted by the text
 /// of its row numbers, which differs from the order of the numbers from ten rows on, or it is
 /// reversed.
-fn of_text_order(table: &Measurements) -> Vec<Misreading> {
-    let order = |first| {
-        let of = move |is_of_joints| Misreading::TextOrder { first, is_of_joints };
-        [false, true].map(of)
-    };
-    let reversed = [Misreading::ReversedRows];
+fn of_whole_order(table: &Measurements) -> Vec<Misreading> {
     if table.len() < 10 {
-        Vec::new()
-    } else {
-        [0, 1].into_iter().flat_map(order).chain(reversed).collect()
+        return Vec::new();
     }
-}
-
-/// Returns the numbers of `rows` rows, from `first` on, in the order of their texts.
-pub(super) fn text_order(rows: usize, first: u8) -> Vec<usize> {
-    let first = usize::from(first);
-    let mut numbers: Vec<usize> = (first..first + rows).collect();
-    numbers.sort_by_key(usize::to_string);
-    numbers
+    // `source` has the row whose position belongs to each row.
+    let ordered = |words: String, source: Vec<usize>| {
+        Misreading::of_order(words, move |table, chosen| {
+            let mut rows = table.select(chosen);
+            rows.positions = chosen.iter().map(|&row| table.positions[source[row]]).collect();
+            rows
+        })
+    };
+    let mut misreadings = Vec::new();
+    for first in [0, 1] {
+        // The numbers of the rows, from `first` on, in the order of their texts.
+        let mut numbers: Vec<usize> = (first..first + table.len()).collect();
+        numbers.sort_by_key(usize::to_string);
+        let of_joints: Vec<usize> = numbers.iter().map(|number| number - first).collect();
+        let mut of_positions = vec![0; table.len()];
+        of_joints.iter().enumerate().for_each(|(place, &row)| of_positions[row] = place);
+        for (what, source) in [("positions", of_positions), ("joint angles", of_joints)] {
+            let words = format!(
+                "{what} whose rows are sorted by the text of their numbers (1, 10, 11, …, 2; join \
+                 the tables by name or number, not by order)"
+            );
+            let order = ordered(words, source).of_kind(Kind::TextOrder);
+            misreadings.push(order.in_group("order of texts"));
+        }
+    }
+    let mut source: Vec<usize> = (0..table.len()).collect();
+    let of_arm: Vec<usize> =
+        (0..table.len()).filter(|&row| table.observation(row).is_of_arm()).collect();
+    of_arm.iter().zip(of_arm.iter().rev()).for_each(|(&row, &opposite)| source[row] = opposite);
+    misreadings.push(ordered("positions in the opposite order of the rows".to_owned(), source));
+    misreadings
 }
 
 /// Returns the number of rows between two rows at which a trial shift begins, for a table of `rows`
@@ -169,233 +290,147 @@ pub(super) fn shift_step(rows: usize) -> usize {
     (rows / SHIFT_PLACES).max(1)
 }
 
-/// Returns the misreadings of the joint table: its convention, units, signs and exchanged entries.
-fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
-    use JointField::{A, Alpha, Beta, D, Theta};
-    let mut forms = vec![Misreading::StandardForm, Misreading::ModifiedForm];
-    let rows = problem.standard_rows().map_or(problem.joints.len(), <[Joint]>::len);
-    forms.extend((1..rows).map(|row| Misreading::ExchangedRows { row }));
-    forms.extend(of_exchanged_lengths(problem));
-    let fields = [Alpha, Theta, Beta];
-    for field in fields {
-        let mut counts = [0; 3];
-        for (joint, declared) in (1..).zip(&problem.joints) {
-            let mut declared = declared.clone();
-            let Some(&mut angle) = number_of(&mut declared, field) else { continue };
-            if (MIN_RADIANS..=2.0 * PI).contains(&angle.to_degrees().abs()) {
-                forms.push(Misreading::TableRadians { joint, field });
-                counts[0] += 1;
-            }
-            if angle.abs() > 2.0 * PI {
-                forms.push(Misreading::TableDegrees { joint, field });
-                counts[1] += 1;
-            }
-            if angle != 0.0 {
-                forms.push(Misreading::Sign { joint, field });
-                counts[2] += 1;
-            }
-        }
-        forms.extend((counts[2] > 1).then_some(Misreading::Sign { joint: 0, field }));
-        forms.extend((counts[0] > 1).then_some(Misreading::TableRadians { joint: 0, field }));
-        forms.extend((counts[1] > 1).then_some(Misreading::TableDegrees { joint: 0, field }));
-    }
-    for (joint, declared) in (2..).zip(problem.joints.iter().skip(1)) {
-        let is_right = |&degrees: &i16| {
-            let other_sign = degrees == 180 && (declared.alpha.abs() - PI / 2.0).abs() < 1e-9;
-            !other_sign && declared.placement.is_none() && declared.kind != JointKind::Fixed
-        };
-        let twist = |degrees| Misreading::Twist { joint, degrees };
-        forms.extend(TWISTS.into_iter().filter(is_right).map(twist));
-    }
-    let count_long = |joint: &Joint| {
-        lengths_of(&mut joint.clone())
-            .iter()
-            .filter(|length| length.abs() > MIN_MILLIMETRE_LENGTH)
-            .count()
-    };
-    let long: usize = problem.joints.iter().map(count_long).sum();
-    for field in [A, D] {
-        let is_set = |joint: &&Joint| {
-            number_of(&mut (*joint).clone(), field).is_some_and(|length| *length != 0.0)
-        };
-        let is_of_several = problem.joints.iter().filter(is_set).count() > 1;
-        forms.extend(is_of_several.then_some(Misreading::Sign { joint: 0, field }));
-    }
-    for (joint, declared) in (1..).zip(&problem.joints) {
-        for field in [A, D, JointField::X, JointField::Y, JointField::Z] {
-            let mut declared = declared.clone();
-            let Some(&mut length) = number_of(&mut declared, field) else { continue };
-            if length == 0.0 {
-                continue;
-            }
-            forms.push(Misreading::Sign { joint, field });
-            let is_plausible = |power: &i8| {
-                PLAUSIBLE_LENGTHS.contains(&(length.abs() * 10.0_f64.powi((*power).into())))
-            };
-            // If only one length is long, [`Misreading::ArmInMillimetres`] covers the case.
-            let is_new =
-                |power: &i8| *power != -3 || length.abs() <= MIN_MILLIMETRE_LENGTH || long > 1;
-            let powers = [-3, 3, -2, 2, -1, 1].into_iter().filter(is_plausible).filter(is_new);
-            forms.extend(powers.map(|power| Misreading::Length { joint, field, power }));
-        }
-    }
-    forms
-}
-
-/// Returns the misreadings that two different lengths of one joint, or of two neighbouring ones,
-/// are exchanged.
-fn of_exchanged_lengths(problem: &Problem) -> Vec<Misreading> {
-    let entries = |joint: usize| [JointField::A, JointField::D].map(|field| (joint, field));
-    let joints = 1..=problem.joints.len();
-    let pairs = joints.flat_map(|joint| {
-        let near = entries(joint).into_iter().chain(entries(joint + 1));
-        let first = entries(joint).into_iter();
-        first.flat_map(move |(joint, field)| {
-            let later = move |(with, other): &(usize, JointField)| {
-                *with > joint || field == JointField::A && *other == JointField::D
-            };
-            near.clone().filter(later).map(move |(with, other)| Misreading::ExchangedLengths {
-                joint,
-                field,
-                with,
-                other,
-            })
-        })
-    });
-    // A standard sheet declares neither a of the first joint nor d of the flange after its last row.
-    let is_declared = |(joint, field): (usize, JointField)| match problem.standard_rows() {
-        None => true,
-        Some(rows) => match field {
-            JointField::A => joint > 1,
-            _ => joint <= rows.len(),
-        },
-    };
-    let are_declared = |pair: &Misreading| match *pair {
-        Misreading::ExchangedLengths { joint, field, with, other } => {
-            is_declared((joint, field)) && is_declared((with, other))
-        }
-        _ => true,
-    };
-    pairs.filter(|pair| are_declared(pair) && pair.rewritten(problem).is_some()).collect()
-}
-
-/// Returns misreadings of masses and payloads by each of `scales`.
-pub(super) fn of_masses(
-    problem: &Problem,
+/// Returns the chosen rows of a table that have a row `by` rows later, and these rows. Rows before
+/// `from` are their own. The last rows before it have none if theirs are taken by rows behind it.
+fn moved(
     table: &Measurements,
-    scales: &[MassScale],
-) -> Vec<Misreading> {
-    let masses = masses_of(&mut problem.clone()).len();
-    let single = if masses > MAX_MASSES { 0 } else { masses };
-    let numbers = 0..=single;
-    let has_payload = table.payload.is_some() || problem.tool.payload_mass > 0.0;
-    let payloads = scales.iter().map(|&scale| Misreading::Payload { scale });
-    numbers
-        .flat_map(|mass| scales.iter().map(move |&scale| Misreading::Mass { mass, scale }))
-        .chain(payloads.filter(|_| has_payload))
-        .collect()
-}
-
-/// Returns the misreadings of the places of masses: a payload at the target, and coordinates of
-/// centres with the other sign.
-pub(super) fn of_places(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
-    let has_payload = table.payload.is_some() || problem.tool.payload_mass > 0.0;
-    let is_elsewhere = has_payload && problem.targets.is_empty() && !problem.tool.payload_follows;
-    let bodies = problem.joints.iter().flat_map(|joint| &joint.bodies);
-    let centres = (1..).zip(bodies).take(MAX_MASSES).flat_map(|(mass, body)| {
-        let axes = (0..3).filter(|&axis| body.position[axis].abs() > MIN_CENTRE);
-        axes.map(move |axis| Misreading::CentreSign { mass, axis })
-    });
-    is_elsewhere.then_some(Misreading::PayloadAtTarget).into_iter().chain(centres).collect()
-}
-
-/// Returns the misreadings of suspension forces: in kilograms instead of newtons, and in the
-/// opposite direction.
-pub(super) fn of_hoists(problem: &Problem) -> Vec<Misreading> {
-    let has_hoist = problem
-        .joints
-        .iter()
-        .any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()));
-    let hoists = [false, true].map(|is_reversed| Misreading::Hoist { is_reversed });
-    hoists.into_iter().filter(|_| has_hoist).collect()
-}
-
-/// Returns the misreadings of masses, payloads, stiffnesses and gravity; none for a rigid arm.
-pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
-    if !problem.is_elastic() {
-        return Vec::new();
-    }
-    let mut misreadings = of_masses(problem, table, &GROSS_MASS_SCALES);
-    misreadings.extend(of_hoists(problem));
-    let elastic = (1..).zip(&problem.joints).filter(|(_, joint)| joint.stiffness.is_some());
-    let elastic: Vec<usize> = elastic.map(|(joint, _)| joint).collect();
-    let single = if elastic.len() > 1 { elastic.as_slice() } else { &[] };
-    for &joint in [0].iter().chain(single) {
-        let of_joint = |power| Misreading::Stiffness { joint, power };
-        misreadings.extend([-3, -1, 1, 3, 0].map(of_joint));
-    }
-    misreadings.extend(of_gravity());
-    misreadings
-}
-
-/// Returns gravity along each axis of the base, in both directions.
-pub(super) fn of_gravity() -> impl Iterator<Item = Misreading> {
-    let along = |axis| [false, true].map(|is_negative| Misreading::Gravity { axis, is_negative });
-    (0..3).flat_map(along)
-}
-
-/// Returns the declared lengths of a joint \[m\]: a, d, and the translation of its placement.
-pub(super) fn lengths_of(joint: &mut Joint) -> Vec<&mut f64> {
-    let placement = joint.placement.as_mut().map(|placement| placement.xyz.iter_mut());
-    [&mut joint.a, &mut joint.d].into_iter().chain(placement.into_iter().flatten()).collect()
-}
-
-/// Returns the entry of a joint for a field of the joint table \[rad\] or \[m\]; `None` if the
-/// joint has no such entry.
-pub(super) fn number_of(joint: &mut Joint, field: JointField) -> Option<&mut f64> {
-    let placement = joint.placement.as_mut();
-    match field {
-        JointField::Alpha => Some(&mut joint.alpha),
-        JointField::Theta => Some(&mut joint.theta),
-        JointField::Beta => Some(&mut joint.beta),
-        JointField::A => Some(&mut joint.a),
-        JointField::D => Some(&mut joint.d),
-        JointField::X => placement.map(|placement| &mut placement.xyz.x),
-        JointField::Y => placement.map(|placement| &mut placement.xyz.y),
-        JointField::Z => placement.map(|placement| &mut placement.xyz.z),
-        _ => None,
-    }
-}
-
-/// Returns the name of a mass and the number of its joint; `mass` counts the numbers of
-/// [`masses_of`] from 1. `None` if there is no such mass, such as for 0.
-pub(super) fn name_of_mass(problem: &Problem, mass: usize) -> Option<(&str, usize)> {
-    let joints = problem.joints.iter().zip(1..);
-    let names = joints.flat_map(|(joint, number)| {
-        names_of_masses(joint).into_iter().map(move |name| (name, number))
-    });
-    names.into_iter().nth(mass.checked_sub(1)?)
-}
-
-/// Returns the names of the masses of a joint, in the order of [`masses_of`].
-fn names_of_masses(joint: &Joint) -> Vec<&str> {
-    let beam = joint.beam.iter().flat_map(|beam| {
-        let bodies = beam.masses.iter().map(|body| body.name.as_str());
-        std::iter::once(beam.name.as_str()).chain(bodies)
-    });
-    beam.chain(joint.bodies.iter().map(|body| body.name.as_str())).collect()
-}
-
-/// Returns the declared masses along the arm \[kg\], joint by joint: its beam, the load on the
-/// beam, and its bodies.
-pub(super) fn masses_of(problem: &mut Problem) -> Vec<&mut f64> {
-    let mut masses = Vec::new();
-    for joint in &mut problem.joints {
-        if let Some(beam) = &mut joint.beam {
-            masses.push(&mut beam.mass);
-            masses.extend(beam.masses.iter_mut().map(|body| &mut body.mass));
+    chosen: &[usize],
+    (by, from): (i8, usize),
+) -> (Vec<usize>, Vec<usize>) {
+    let source = |row: usize| {
+        let shifted = row.checked_add_signed(by.into())?;
+        let is_taken = row < from && row.saturating_add_signed(isize::from(-by)) >= from;
+        match row {
+            _ if is_taken => None,
+            row if row < from => Some(row),
+            _ => (shifted < table.len()).then_some(shifted),
         }
-        masses.extend(joint.bodies.iter_mut().map(|body| &mut body.mass));
+    };
+    chosen.iter().filter_map(|&row| Some((row, source(row)?))).unzip()
+}
+
+/// Returns the misreadings that payloads belong to the configuration of the row before or after.
+pub(super) fn of_shifted_payloads(table: &Measurements) -> Vec<Misreading> {
+    let shifted = |by: i8| {
+        let side = if by > 0 { "before" } else { "after" };
+        let rows = counted(by.unsigned_abs(), "row");
+        let words = format!("payloads that belong to the configuration {rows} {side}");
+        let shifted = Misreading::of_order(words, move |table, chosen| {
+            let (chosen, sources) = moved(table, chosen, (by, 0));
+            let mut rows = table.select(&chosen);
+            let of_table = table.payload.as_ref();
+            rows.payload = of_table.map(|of| sources.into_iter().map(|row| of[row]).collect());
+            rows
+        });
+        shifted.in_group("shift of payloads")
+    };
+    [-1, 1].into_iter().filter(|_| table.payload.is_some()).map(shifted).collect()
+}
+
+impl Misreading {
+    /// Creates the misreading that positions belong to the configuration `by` rows before theirs, from
+    /// a row on.
+    pub(super) fn shifted(by: i8, from: usize) -> Self {
+        let side = if by > 0 { "before" } else { "after" };
+        // Behind it the configuration at `from` is the first with another position.
+        let first = from.saturating_add_signed(isize::from(by.min(0))) + 1;
+        let start =
+            if from > 0 { format!(", from row {first} of the table on") } else { String::new() };
+        let rows = counted(by.unsigned_abs(), "row");
+        let words = format!("positions that belong to the configuration {rows} {side}{start}");
+        let shift = Self::of_order(words, move |table, chosen| {
+            let (chosen, sources) = moved(table, chosen, (by, from));
+            let mut rows = table.select(&chosen);
+            rows.positions = sources.into_iter().map(|row| table.positions[row]).collect();
+            rows
+        });
+        shift.of_kind(Kind::Shifted(by, from)).in_group("shift")
     }
-    masses
+
+    /// Returns a clause that names the offset of the clocks with which positions belong to the
+    /// configurations of their rows; empty unless tables are joined by time.
+    pub(super) fn clock_hint(&self, table: &Measurements) -> String {
+        let Kind::Shifted(by, 0) = self.kind else { return String::new() };
+        let offset = table.clock_offsets.iter().find(|(rows, _)| *rows == by);
+        offset.map_or_else(String::new, |(_, seconds)| {
+            let seconds = (seconds * 1e3).round() / 1e3;
+            format!(
+                " (joined by time: the clocks may differ; with offset_s = {seconds} in joints they \
+                 belong to that of their own row)"
+            )
+        })
+    }
+
+    /// Creates the misreading that two coordinates of positions are exchanged, or that one has the
+    /// wrong sign if both are the same; `None` if the free base makes all alike.
+    pub(super) fn mirrored(axes: Option<[usize; 2]>) -> Self {
+        let words = match axes {
+            None => "two of x, y and z that are exchanged, or one of the other sign".to_owned(),
+            Some([axis, with]) if axis == with => {
+                format!("{} of the positions that has the other sign", AXES[axis])
+            }
+            Some([axis, with]) => {
+                format!("{} and {} of the positions that are exchanged", AXES[axis], AXES[with])
+            }
+        };
+        let [first, second] = axes.unwrap_or([0, 1]);
+        let sign = if first == second { -1.0 } else { 1.0 };
+        let mirrored = Self::of_positions(words, move |position| {
+            position.swap_rows(first, second);
+            position[first] *= sign;
+        });
+        mirrored.of_kind(Kind::Mirrored).in_group("mirrored")
+    }
+
+    /// Returns all misreadings of the hand of the measuring frame, for a base that is held or known.
+    pub(super) fn all_mirrored() -> impl Iterator<Item = Self> {
+        let pairs = (0..3).flat_map(|first| (first..3).map(move |second| [first, second]));
+        pairs.map(|axes| Self::mirrored(Some(axes)))
+    }
+
+    /// Creates the misreading that all positions are on another scale, by a ratio in hundredths.
+    fn of_scale(percent: i16) -> Self {
+        let ratio = f64::from(percent);
+        let words = "positions on another scale than the joint table (scale factor of the \
+                     instrument, or a joint table of another size of this arm)";
+        Self::of_positions(words, move |position| *position *= 100.0 / ratio)
+            .of_kind(Kind::Scale)
+            .in_group("scale")
+            .with_size(
+                ("tracker-scale.error", Some(Effect::TrackerScale)),
+                move |x| ratio / 100.0 * (1.0 + x),
+                move |size| format!("{words}: {size:.4} times as large"),
+            )
+    }
+
+    /// Creates the misreading that the base stands elsewhere, if the problem holds it.
+    pub(super) fn held_base() -> Self {
+        let words = "a base that stands elsewhere than declared (free it in [parameters]: \"base.*\" \
+                     = { free = true })";
+        Self::of_problem(words, |problem| {
+            free(problem, &["base*"]);
+            Some(())
+        })
+        .of_kind(Kind::HeldBase)
+    }
+
+    /// Creates the misreading that the target lies elsewhere, if the problem holds it.
+    pub(super) fn held_target() -> Self {
+        let words = "a target that lies elsewhere than [tool] declares (correct it there, or free it \
+                     in [parameters]: \"tool.*\" = { free = true })";
+        let patterns = ["tool*.x", "tool*.y", "tool*.z"];
+        Self::of_problem(words, move |problem| {
+            free(problem, &patterns);
+            Some(())
+        })
+        .of_kind(Kind::HeldTarget)
+    }
+}
+
+/// Frees parameters of a problem.
+fn free(problem: &mut Problem, patterns: &[&str]) {
+    for pattern in patterns {
+        let rule = ParameterRule::free((*pattern).to_owned(), problem);
+        problem.parameters.push(rule);
+    }
 }

@@ -4,6 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use crate::fit::stages::fitting::Fitting;
+use crate::numeric::spaced;
 
 /// Smallest mean number of chosen rows of a session with which rows of all sessions are chosen.
 const MIN_SESSION_ROWS: usize = 8;
@@ -31,6 +32,5 @@ pub(super) fn chosen_rows(fitting: &Fitting, count: usize) -> Vec<usize> {
         }
         rows.retain(|row| taken.contains(&session(row)));
     }
-    let step = rows.len().div_ceil(count).max(1);
-    rows.into_iter().step_by(step).collect()
+    spaced(rows, count)
 }

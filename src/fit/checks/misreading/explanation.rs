@@ -39,7 +39,7 @@ impl LeftOutMisfit {
 }
 
 /// Misreadings that would explain the misfit of a fit, best first.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Clone, Default)]
 pub(in crate::fit) struct Explanations {
     /// Misreadings with whose correction the registered nominal arm has a far smaller error.
     pub near: Vec<Misreading>,

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{DVector, Vector3};
 
-use super::Misreading;
+use super::{Kind, Misreading};
 use crate::fit::checks::contradicted_entry::mistaken_target;
 use crate::model::Model;
 use crate::problem::{BasePose, Problem};
@@ -21,14 +21,14 @@ impl Misreading {
     /// Returns words that state where the fit with the parameters `x` found the base or the target
     /// that the problem holds elsewhere, and with which reading the declaration would agree. Empty
     /// for other misreadings.
-    pub(super) fn found_place(self, problem: &Problem, model: &Model, x: &DVector<f64>) -> String {
-        match self {
-            Self::HeldBase => {
+    pub(super) fn found_place(&self, problem: &Problem, model: &Model, x: &DVector<f64>) -> String {
+        match self.kind {
+            Kind::HeldBase => {
                 let bases = model.base_frames(x.as_slice());
                 let [found] = bases.as_slice() else { return String::new() };
                 base_in_words(&problem.base, found)
             }
-            Self::HeldTarget => {
+            Kind::HeldTarget => {
                 let targets = model.target_positions(x.as_slice());
                 let [found] = targets.as_slice() else { return String::new() };
                 let mistake = mistaken_target(problem.tool.target, *found);

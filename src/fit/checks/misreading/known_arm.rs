@@ -2,15 +2,15 @@
 
 use nalgebra::DVector;
 
-use super::Misreading;
 use super::candidates::candidates;
 use super::first_of;
 use super::reversed::MAX_REVERSED;
 use super::search::{MAX_CLEAR_RATIO, MAX_RATIO_TO_BEST};
+use super::{Kind, Misreading};
 use crate::fit::Placement;
 use crate::measurement::Measurements;
 use crate::model::Model;
-use crate::numeric::parallel;
+use crate::numeric::{parallel, root_mean, spaced};
 use crate::problem::Problem;
 
 /// Maximum number of rows, evenly spaced, that are predicted with each misreading.
@@ -35,38 +35,31 @@ pub(crate) fn misread_table(
     if table.select(&of_positions).configurations(problem).1 < MIN_CONFIGURATIONS {
         return None;
     }
-    let step = of_positions.len().div_ceil(MAX_PREDICTED_ROWS).max(1);
-    let chosen: Vec<usize> = of_positions.iter().copied().step_by(step).collect();
-    let error = |misreading: Misreading, chosen: &[usize]| {
-        let rows = misreading.undone(table, chosen, (problem, table.joints));
+    let chosen = spaced(of_positions.clone(), MAX_PREDICTED_ROWS);
+    let error = |misreading: &Misreading, chosen: &[usize]| {
+        let rows = misreading.undone(table, chosen, table.joints);
         let of_rows = Placement::of(&rows);
         if of_rows.bases != placement.bases || of_rows.targets != placement.targets {
             return None;
         }
         let every_row: Vec<usize> = (0..rows.len()).collect();
         let residuals = model.residuals(of_rows.poses(&rows, &every_row, 1.0), x);
-        let squares = residuals.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>();
-        let rms = (squares / residuals.len() as f64).sqrt();
-        rms.is_finite().then_some((misreading, rms))
+        let rms = root_mean(residuals.iter().map(nalgebra::Matrix::norm_squared));
+        rms.is_finite().then(|| (misreading.clone(), rms))
     };
-    let as_read = |chosen: &[usize]| Some(error(Misreading::Reversed { joints: 0 }, chosen)?.1);
-    let leaves_out_rows = |misreading: &Misreading| {
-        matches!(misreading, Misreading::Shifted { .. } | Misreading::ShiftedPayload { .. })
-    };
+    let as_read = |chosen: &[usize]| Some(error(&Misreading::none(), chosen)?.1);
     // The estimate contradicts misreadings of the problem, and small zero offsets are changes.
     let is_of_table = |misreading: &Misreading| {
-        !matches!(misreading, Misreading::Zero { .. } | Misreading::Mirrored { .. })
-            && !leaves_out_rows(misreading)
-            && !misreading.concerns_problem()
-            && misreading.rewritten(problem).is_none()
+        let is_left_out =
+            matches!(misreading.kind, Kind::Zero(..) | Kind::Mirrored | Kind::Shifted(..));
+        !is_left_out && !misreading.concerns_problem()
     };
     let mut tested = candidates(problem, table);
     tested.retain(is_of_table);
-    let axes = (0..3).flat_map(|first| (first..3).map(move |second| Some([first, second])));
-    tested.extend(axes.map(|axes| Misreading::Mirrored { axes }));
-    let reversed = |joints: u64| Misreading::Reversed { joints };
+    tested.extend(Misreading::all_mirrored());
     let sets = 1..1_u64 << table.joints.min(MAX_REVERSED);
-    tested.extend(sets.filter(|joints| joints.count_ones() > 1).map(reversed));
+    let sets = sets.filter(|joints| joints.count_ones() > 1);
+    tested.extend(sets.map(Misreading::reversed));
     let near = |errors: Vec<Option<(Misreading, f64)>>, as_read: f64| {
         let mut errors: Vec<(Misreading, f64)> = errors.into_iter().flatten().collect();
         errors.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -75,23 +68,20 @@ pub(crate) fn misread_table(
         errors.retain(|(_, rms)| *rms <= limit);
         errors
     };
-    let errors = parallel::map_items(&tested, |misreading| error(*misreading, &chosen));
+    let errors = parallel::map_items(&tested, |misreading| error(misreading, &chosen));
     // The few rows only choose the misreadings that are tried with all.
     let chosen = near(errors, as_read(&chosen)?).into_iter();
-    let errors = chosen.map(|(misreading, _)| error(misreading, &of_positions)).collect();
+    let errors = chosen.map(|(misreading, _)| error(&misreading, &of_positions)).collect();
     let explaining = near(errors, as_read(&of_positions)?);
     let best = explaining.first()?.1;
-    let words = |misreading: Misreading| {
-        let words = misreading.described(None, problem);
+    let words = |misreading: &Misreading| {
+        let words = misreading.described(None);
         let may_be_of_arm = matches!(
-            misreading,
-            Misreading::Ratio { .. }
-                | Misreading::Coupled { .. }
-                | Misreading::Screw { .. }
-                | Misreading::Reversed { .. }
+            misreading.kind,
+            Kind::Ratio(_) | Kind::Coupled | Kind::Screw | Kind::Reversed(_)
         );
         if may_be_of_arm { format!("{words} (or the arm has changed so)") } else { words }
     };
-    let named: Vec<String> = explaining.iter().map(|(misreading, _)| words(*misreading)).collect();
+    let named: Vec<String> = explaining.iter().map(|(misreading, _)| words(misreading)).collect();
     Some((first_of(&named), best))
 }

@@ -1,14 +1,19 @@
 //! Search for wrong masses, places of masses and suspension forces of an arm that gives way.
 
 use super::Misreading;
-use super::candidates::{MASS_SCALES, of_gravity, of_hoists, of_masses, of_places};
+use super::candidates::of_shifted_payloads;
 use super::explanation::Explanations;
+use super::loads::{
+    MassScale, NEWTONS, POUNDS, TENFOLD, TENTH, of_gravity, of_hoists, of_masses, of_places,
+};
 use super::payload_rows::of_payload_rows;
 use super::search::Trial;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::stages::fitting::Fitting;
 use crate::numeric::parallel;
 
+/// Scales of masses that an arm with compliances nearly makes up for.
+const MASS_SCALES: [MassScale; 4] = [TENTH, TENFOLD, POUNDS, NEWTONS];
 /// Maximum number of rows, evenly spaced, by which the misreadings are ranked.
 const MAX_RANKED_ROWS: usize = 40;
 /// Rounds of the ranking: solver steps of each fit, and the number of misreadings that remain. Those
@@ -40,34 +45,27 @@ pub(in crate::fit) fn misread_masses(
     limit: f64,
     within_priors: bool,
 ) -> Explanations {
-    let gives_way =
-        fit.fitting.model.parameters.iter().any(|parameter| parameter.site.is_elastic());
+    let gives_way = fit.model().parameters.iter().any(|parameter| parameter.site.is_elastic());
     if !gives_way && !fit.problem.is_elastic() {
         return Explanations::default();
     }
-    let measurements = fit.fitting.measurements;
+    let measurements = fit.table();
     let mut tested = of_masses(fit.problem, measurements, &MASS_SCALES);
     tested.extend(of_places(fit.problem, measurements));
     tested.extend(of_hoists(fit.problem));
     tested.extend(of_gravity());
-    let has_payloads = measurements.payload.is_some();
-    let shifts = [-1, 1].map(|by| Misreading::ShiftedPayload { by });
-    tested.extend(shifts.into_iter().filter(|_| has_payloads));
+    tested.extend(of_shifted_payloads(measurements));
     let (few, end) = (Trial::with_rows(fit, MAX_RANKED_ROWS), &fit.end.x);
-    let error = |&misreading: &Misreading, steps: u64| {
+    let error = |misreading: &Misreading, steps: u64| {
         let error = few.with_corrected(misreading, false, |fitting, _| {
             let fitting = Fitting { max_steps: Some(steps), ..fitting.with_declared_noise() };
             if fitting.model.parameters.len() != end.len() {
                 return None;
             }
-            let end = if within_priors {
-                fitting.run(end).ok()?
-            } else {
-                fitting.run(&fitting.registered().ok()?).ok()?
-            };
+            let end = if within_priors { fitting.run(end).ok()? } else { fitting.refitted()? };
             Some(few.penalised(&fitting, &fitting.split.identification, &end.x))
         })?;
-        error.is_finite().then_some((misreading, error))
+        error.is_finite().then(|| (misreading.clone(), error))
     };
     for (steps, left) in ROUNDS {
         let ranked = parallel::map_items(&tested, |misreading| error(misreading, steps));

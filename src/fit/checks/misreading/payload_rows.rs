@@ -7,14 +7,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::Misreading;
 use super::explanation::Explanation;
+use super::loads::{MassScale, NEWTONS, POUNDS, TENFOLD, TENTH, THOUSANDFOLD, THOUSANDTH};
 use super::search::Trial;
-use super::{MassScale, Misreading};
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::row_kind::listed;
 use crate::fit::stages::fitting::Fitting;
 use crate::least_squares::{LinearisationCache, jacobian_and_residual};
 use crate::measurement::Measurements;
+use crate::numeric;
 use crate::quantity::format::about_three_digits;
 
 /// Minimum number of rows of the search, and of rows with another payload.
@@ -33,22 +35,13 @@ const DIFFERENCE: f64 = 1e-3;
 const MAX_FITTED: usize = 4;
 /// Maximum number of payloads that a column of one number may stand for.
 const MAX_CLUSTERS: usize = 4;
-/// Maximum number of rows that the words list.
-const MAX_LISTED: usize = 3;
 /// Smallest ratio of the error as read to the largest one with a mistake corrected, at which every row
 /// may have another payload than the table states: that many numbers make up for small errors.
 const MIN_CLEAR_RATIO: f64 = 2.5;
 /// Maximum number of different payloads of a column.
 const MAX_LEVELS: usize = 12;
 /// Factors of payloads in another unit, or with a misplaced decimal point.
-const SCALES: [MassScale; 6] = [
-    MassScale::Pounds,
-    MassScale::Newtons,
-    MassScale::Power(-1),
-    MassScale::Power(1),
-    MassScale::Power(-3),
-    MassScale::Power(3),
-];
+const SCALES: [MassScale; 6] = [POUNDS, NEWTONS, TENTH, TENFOLD, THOUSANDTH, THOUSANDFOLD];
 
 /// Payloads of the rows with the arm that fits them.
 struct Fitted {
@@ -79,14 +72,14 @@ struct Rows<'a> {
 /// Returns the mistake of the column of payloads with which a fit leaves at most `limit` \[m\];
 /// `None` if there is none, or no such column.
 pub(super) fn of_payload_rows(trial: &Trial, fit: &CheckedFit, limit: f64) -> Option<Explanation> {
-    let table = fit.fitting.measurements;
+    let table = fit.table();
     let column = table.payload.as_ref()?;
     let stated: Vec<f64> = trial.chosen.iter().map(|&row| column[row]).collect();
     let largest = column.iter().copied().fold(0.0, f64::max);
     if stated.len() < MIN_ROWS[0] || largest <= 0.0 || fit.fitting.earlier.is_some() {
         return None;
     }
-    trial.with_corrected(Misreading::Reversed { joints: 0 }, false, |fitting, problem| {
+    trial.with_corrected(&Misreading::none(), false, |fitting, problem| {
         let rows = Rows { trial, fitting, stated, largest };
         let free: Vec<Option<usize>> = (0..rows.stated.len()).map(Some).collect();
         let found = rows.fitted(&fit.end.x, &rows.stated, &free)?;
@@ -213,9 +206,7 @@ impl Rows<'_> {
         mistakes.retain(|mistake| self.count_changed(&mistake.payloads) >= least);
         mistakes.sort_by(|a, b| misfit(a).total_cmp(&misfit(b)));
         mistakes.truncate(MAX_FITTED);
-        let mut levels = self.stated.clone();
-        levels.sort_by(f64::total_cmp);
-        levels.dedup();
+        let levels = numeric::levels(self.stated.iter().copied());
         if !is_clear {
             return mistakes;
         }
@@ -293,9 +284,7 @@ impl Rows<'_> {
     /// Returns the mistakes that a column of payloads may have.
     fn mistakes(&self, table: &Measurements, column: &[f64]) -> Vec<Mistake> {
         let rows = &self.trial.chosen;
-        let mut levels = self.stated.clone();
-        levels.sort_by(f64::total_cmp);
-        levels.dedup();
+        let levels = numeric::levels(self.stated.iter().copied());
         let mut mistakes = Vec::new();
         let mut add = |words: String, of_row: &dyn Fn(usize, f64) -> f64| {
             let payloads = rows.iter().zip(&self.stated);
@@ -328,10 +317,9 @@ impl Rows<'_> {
                     if row < from { stated } else { other.copied().unwrap_or(stated) }
                 });
             }
-            for scale in SCALES {
-                let (words, factor) = (scale.to_string(), scale.factor());
+            for (factor, scale) in SCALES {
                 if from != rows[0] {
-                    let words = format!("payloads from {} on that are {words}", place(from));
+                    let words = format!("payloads from {} on that are {scale}", place(from));
                     add(words, &|row, stated| if row < from { stated } else { factor * stated });
                     let words = format!("payloads before {} that are {}", place(from), scale);
                     add(words, &|row, stated| if row < from { factor * stated } else { stated });
@@ -340,10 +328,10 @@ impl Rows<'_> {
         }
         let files = table.origin.iter().map(|(file, _)| *file).max().map_or(1, |last| last + 1);
         for file in (0..files).filter(|_| files > 1) {
-            for scale in SCALES {
+            for (factor, scale) in SCALES {
                 let name = table.files[file as usize].display();
                 add(format!("payloads of {name} that are {scale}"), &|row, stated| {
-                    if table.origin[row].0 == file { scale.factor() * stated } else { stated }
+                    if table.origin[row].0 == file { factor * stated } else { stated }
                 });
             }
         }
@@ -386,7 +374,7 @@ impl Rows<'_> {
             let words =
                 changed.iter().map(|&k| format!("{} kg in {}", shown(payloads[k]), place(k)));
             let words: Vec<String> = words.collect();
-            format!("other payloads in some rows: {}", listed(&words, MAX_LISTED))
+            format!("other payloads in some rows: {}", listed(&words))
         };
         Some(Mistake { words, payloads })
     }

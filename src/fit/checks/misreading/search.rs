@@ -5,12 +5,13 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{DVector, Vector3};
 
-use super::Misreading;
-use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
+use super::candidates::{candidates, is_far, of_order, shift_step};
 use super::chosen_rows::chosen_rows;
+use super::commands::is_unit_ratio;
+use super::entries::of_two_entries;
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
-use super::two_entries::of_two_entries;
-use super::undo::is_unit_ratio;
+use super::loads::of_loads;
+use super::{Kind, Misreading};
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::common_scale::MIN_SCALE_ERROR;
 use crate::fit::checks::nominal_error::is_nominal_far_off;
@@ -21,7 +22,7 @@ use crate::fit::{Placement, SolverChoice};
 use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
-use crate::numeric::parallel;
+use crate::numeric::{parallel, whole};
 use crate::problem::Problem;
 
 /// Largest ratio of the rms error with a misreading corrected to that without a correction, at
@@ -77,18 +78,16 @@ pub(super) const TRIAL_TOLERANCE: f64 = 1e-4;
 /// robust loss.
 const MAX_SET_ASIDE_SHARE: f64 = 0.3;
 
-/// Result of a trial with a misreading corrected.
+/// Result of a full fit with a misreading corrected.
 pub(super) struct Outcome {
-    /// Root mean squared error \[m\]; after a full fit it includes the deviations from priors.
+    /// Root mean squared error with the deviations from priors \[m\].
     pub rms: f64,
-    /// Fitted size of the misreading; `None` without a full fit, or if the misreading has no size.
+    /// Fitted size of the misreading; `None` if it has no size.
     size: Option<f64>,
-    /// Words on the base or target that a full fit found elsewhere than declared; otherwise empty.
+    /// Words on the base or target that was found elsewhere than declared; otherwise empty.
     place: String,
-    /// Cross-validation misfit of a full fit; `None` without one.
-    left_out: Option<LeftOutMisfit>,
-    /// True if no parameter of the arm deviates far beyond its prior; always true without a full
-    /// fit.
+    left_out: LeftOutMisfit,
+    /// True if no parameter of the arm deviates far beyond its prior.
     is_within_priors: bool,
 }
 
@@ -109,16 +108,16 @@ pub(super) fn explanations(fit: &CheckedFit) -> Explanations {
     let trial = Trial::new(fit);
     // The error as declared, without orientations as in all trials: reversing no joint changes
     // nothing.
-    let as_declared = trial.outcome(Misreading::Reversed { joints: 0 }, false);
-    let nominal = as_declared.map_or(nominal, |outcome| outcome.rms.min(nominal));
+    let as_declared = trial.registered_error(&Misreading::none());
+    let nominal = as_declared.map_or(nominal, |error| error.min(nominal));
     let is_position = measurements.leading().is_position();
     // Contacts with one point agree with any arm whose target hardly moves. For rows other than
     // positions, only reversed joints are therefore tried.
     let last = trial.chosen.last().copied().unwrap_or_default();
-    let is_tested = |misreading: &Misreading| match misreading {
-        Misreading::Reversed { .. } => true,
+    let is_tested = |misreading: &Misreading| match misreading.kind {
+        Kind::Reversed(_) => true,
         // A shift that begins behind the last row changes nothing.
-        Misreading::Shifted { from, .. } => is_position && *from <= last,
+        Kind::Shifted(_, from) => is_position && from <= last,
         _ => is_position,
     };
     let listed = if is_position && nominal < MAX_REACHES_OF_LOADS * model.reach() {
@@ -127,46 +126,45 @@ pub(super) fn explanations(fit: &CheckedFit) -> Explanations {
         candidates(fit.problem, measurements)
     };
     let mut tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
-    let mirrored = Misreading::Mirrored { axes: None };
-    if !fit.is_base_free() && tested.contains(&mirrored) {
-        tested.retain(|misreading| *misreading != mirrored);
-        let pairs = (0..3).flat_map(|first| (first..3).map(move |second| [first, second]));
-        tested.extend(pairs.map(|axes| Misreading::Mirrored { axes: Some(axes) }));
+    let is_mirrored = |misreading: &Misreading| misreading.kind == Kind::Mirrored;
+    if !fit.is_base_free() && tested.iter().any(is_mirrored) {
+        tested.retain(|misreading| !is_mirrored(misreading));
+        tested.extend(Misreading::all_mirrored());
     }
     // A base that is only a little off is no misreading.
     let is_base_held = is_position && fit.is_a_base_held() && is_nominal_far_off(fit);
-    tested.extend(is_base_held.then_some(Misreading::HeldBase));
+    tested.extend(is_base_held.then(Misreading::held_base));
     // A target that is declared far from its frame may be in millimetres, which another misreading
     // covers.
     let is_target_held = is_position && fit.is_target_held() && !is_far(fit.problem);
-    tested.extend(is_target_held.then_some(Misreading::HeldTarget));
+    tested.extend(is_target_held.then(Misreading::held_target));
     let mut errors = trial.registered_errors(&tested);
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     // Two reversed joints have the same effect as an α between them that is wrong by 180°.
-    let alone: Vec<(Misreading, f64)> = errors
-        .iter()
-        .copied()
-        .filter(|(misreading, _)| !matches!(misreading, Misreading::Twist { .. }))
-        .collect();
-    let is_near_alone = !near_misreadings(&alone, nominal).is_empty();
+    let alone = errors.iter().filter(|(misreading, _)| misreading.kind != Kind::Twist);
+    let alone: Vec<f64> = alone.map(|(_, error)| *error).collect();
+    let is_near_alone = near_errors(&alone, nominal) > 0;
     let near_alone = if is_near_alone { near_misreadings(&errors, nominal) } else { Vec::new() };
     if is_position || near_misreadings(&errors, nominal).is_empty() {
         errors.extend(trial.several_reversed(&tested));
     }
     let is_near = !near_misreadings(&errors, nominal).is_empty();
-    errors.extend(trial.registered_errors(&of_two_entries(&tested, is_near)));
+    errors.extend(trial.registered_errors(&of_two_entries(fit.problem, &tested, is_near)));
     // Any other number in the joint table is only tried where no usual mistake comes near.
     let least = errors.iter().map(|(_, error)| *error).fold(nominal, f64::min);
     if is_position && least > MIN_REACHES_OF_TYPED * model.reach() {
         errors.extend(trial.typed_entries(fit.problem, nominal));
     }
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
-        *shift = trial.with_best_start(*shift);
+    if let Some(shift) =
+        errors.iter_mut().find(|(found, _)| matches!(found.kind, Kind::Shifted(..)))
+    {
+        *shift = trial.with_best_start(shift);
     }
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let near = if near_alone.is_empty() { near_misreadings(&errors, nominal) } else { near_alone };
-    let near_error = errors.iter().find(|(found, _)| near.first() == Some(found));
+    let first = near.first().map(Misreading::key);
+    let near_error = errors.iter().find(|(found, _)| Some(found.key()) == first);
     let near_error = near_error.map_or(f64::NAN, |(_, error)| *error);
     let mut explanations = Explanations { near, near_error, ..Explanations::default() };
     if is_position {
@@ -194,9 +192,15 @@ fn deviations(fitting: &Fitting, x: &DVector<f64>) -> f64 {
 /// Returns the misreadings whose error of the registered nominal arm is far smaller than `nominal`,
 /// the error without a correction. `errors` is in ascending order.
 pub(super) fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
-    let best = errors.first().map_or(0.0, |found| found.1);
+    let count = near_errors(&errors.iter().map(|(_, error)| *error).collect::<Vec<_>>(), nominal);
+    errors[..count].iter().map(|(misreading, _)| misreading.clone()).collect()
+}
+
+/// Returns the number of `errors`, which are in ascending order, that are far smaller than `nominal`.
+pub(super) fn near_errors(errors: &[f64], nominal: f64) -> usize {
+    let best = errors.first().copied().unwrap_or(0.0);
     let limit = (MAX_EXPLAINED_RATIO * nominal).min(MAX_RATIO_TO_BEST * best);
-    errors.iter().take_while(|found| found.1 <= limit).map(|(misreading, _)| *misreading).collect()
+    errors.iter().take_while(|error| **error <= limit).count()
 }
 
 impl<'a> Trial<'a> {
@@ -231,19 +235,19 @@ impl<'a> Trial<'a> {
         if are_all_chosen && self.fitting.turn_sigma.is_none() {
             return f64::INFINITY;
         }
-        let refitted =
-            self.with_corrected(Misreading::Reversed { joints: 0 }, true, |fitting, _| {
-                let end = fitting.run(&fit.end.x).ok()?;
-                Some(self.penalised(fitting, &fitting.split.identification, &end.x))
-            });
+        let refitted = self.with_corrected(&Misreading::none(), true, |fitting, _| {
+            let end = fitting.run(&fit.end.x).ok()?;
+            Some(self.penalised(fitting, &fitting.split.identification, &end.x))
+        });
         refitted.unwrap_or(f64::INFINITY)
     }
 
     /// Returns the misreadings that can be corrected, each with the rms error of the registered
     /// nominal arm after the correction \[m\].
     pub(super) fn registered_errors(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
-        let error =
-            |&misreading: &Misreading| Some((misreading, self.outcome(misreading, false)?.rms));
+        let error = |misreading: &Misreading| {
+            Some((misreading.clone(), self.registered_error(misreading)?))
+        };
         let errors = parallel::map_items(misreadings, error);
         errors.into_iter().flatten().collect()
     }
@@ -252,40 +256,37 @@ impl<'a> Trial<'a> {
     /// [`MAX_FITTED_MISREADINGS`]. Returns those with an rms error far below `as_read` \[m\], best
     /// first.
     fn fit_in_full(&self, errors: &[(Misreading, f64)], as_read: f64) -> Vec<Explanation> {
-        let mut groups = Vec::new();
+        let mut keys = Vec::new();
         let mut is_first = |misreading: &Misreading| {
-            let is_new = !groups.contains(&misreading.group());
-            groups.push(misreading.group());
+            let key = misreading.key().to_owned();
+            let is_new = !keys.contains(&key);
+            keys.push(key);
             is_new
         };
-        let chosen: Vec<Misreading> = errors
-            .iter()
-            .map(|(misreading, _)| *misreading)
-            .filter(|misreading| is_first(misreading))
-            .take(MAX_FITTED_MISREADINGS)
-            .map(|misreading| self.with_best_ratio(misreading))
-            .collect();
+        let first = errors.iter().map(|(misreading, _)| misreading).filter(|of| is_first(of));
+        let chosen = first.take(MAX_FITTED_MISREADINGS).cloned();
+        let chosen: Vec<Misreading> = chosen.map(|of| self.with_best_ratio(of)).collect();
         self.explained(&chosen, MAX_EXPLAINED_RATIO * as_read)
     }
 
     /// Returns those of the `chosen` misreadings that leave less than `limit` \[m\] after a full
     /// fit, best first.
     pub(super) fn explained(&self, chosen: &[Misreading], limit: f64) -> Vec<Explanation> {
-        let explanation = |&misreading: &Misreading| {
+        let explanation = |misreading: &Misreading| {
             if misreading.is_minute() {
                 return None;
             }
             let Outcome { rms, size, place, left_out, is_within_priors } =
-                self.outcome(misreading, true)?;
+                self.outcome(misreading)?;
             // A negative ratio means that the joint turns against its command, and one of 1 is no
             // misreading.
-            let is_impossible = |size: f64| match misreading {
-                Misreading::Ratio { joint, .. } => {
-                    let is_still = size * self.commanded_range(joint - 1) < MIN_MOTION;
+            let is_impossible = |size: f64| match misreading.kind {
+                Kind::Ratio(joint) => {
+                    let is_still = size * self.commanded_range(joint) < MIN_MOTION;
                     is_still && !is_unit_ratio(size) || (size - 1.0).abs() < MIN_RATIO_ERROR
                 }
-                Misreading::Scale { .. } => (size - 1.0).abs() < MIN_SCALE_ERROR,
-                Misreading::Screw { .. } => !SCREW_LEAD_RANGE.contains(&(TAU / size.abs())),
+                Kind::Scale => (size - 1.0).abs() < MIN_SCALE_ERROR,
+                Kind::Screw => !SCREW_LEAD_RANGE.contains(&(TAU / size.abs())),
                 _ => false,
             };
             if size.is_some_and(is_impossible) {
@@ -294,19 +295,23 @@ impl<'a> Trial<'a> {
             // An explanation that needs deviations far beyond the priors is of another arm than the
             // measured one. Shifts of rows are exempt, because they leave one row with a wrong
             // configuration.
-            let is_shift = misreading.shifted_from().is_some();
+            let is_shift = matches!(misreading.kind, Kind::Shifted(..));
             let clocks = misreading.clock_hint(self.fitting.measurements);
             if !is_within_priors && !is_shift && rms > self.largest_usual_error() {
                 return None;
             }
             let explanation = Explanation {
-                words: misreading.described(size, self.problem) + &place + &clocks,
+                words: misreading.described(size) + &place + &clocks,
                 rms,
                 effect: size.and_then(|size| misreading.expressed(size)),
-                left_out: left_out?,
+                left_out,
             };
             // Errors are compared in the unit of the table.
-            Some((rms / misreading.position_factor(), explanation))
+            let factor = match misreading.kind {
+                Kind::Unit(factor) | Kind::UsualUnit(factor) => factor,
+                _ => 1.0,
+            };
+            Some((rms / factor, explanation))
         };
         let explained = parallel::map_items(chosen, explanation);
         let mut explained: Vec<(f64, Explanation)> =
@@ -317,43 +322,48 @@ impl<'a> Trial<'a> {
         explained.into_iter().map(|(_, explanation)| explanation).collect()
     }
 
-    /// Returns the errors with a misreading corrected: those of the registered nominal arm or, if
-    /// `is_fitted`, those after a full fit. `None` if the misreading cannot be corrected or fitted.
-    pub(super) fn outcome(&self, misreading: Misreading, is_fitted: bool) -> Option<Outcome> {
-        self.with_corrected(misreading, is_fitted, |fitting, corrected| {
+    /// Returns the rms error of the registered nominal arm with a misreading corrected \[m\]; `None` if
+    /// it cannot be corrected, or if the arm then does not follow the points.
+    pub(super) fn registered_error(&self, misreading: &Misreading) -> Option<f64> {
+        self.with_corrected(misreading, false, |fitting, _| {
             let rows = &fitting.split.identification;
-            if !is_fitted {
-                let registered = fitting.registered_to(TRIAL_TOLERANCE).ok()?;
-                let rms = self.error(fitting, rows, &registered);
-                let place = String::new();
-                let outcome =
-                    Outcome { rms, size: None, place, left_out: None, is_within_priors: true };
-                // An arm that a misreading shrinks to a point misses points by their spread, which
-                // explains nothing, however small the spread is.
-                let points = &fitting.measurements.positions;
-                let spread = spread(fitting.placement, rows, |place| points[rows[place]]);
-                let is_followed = !fitting.measurements.leading().is_position()
-                    || misreading == (Misreading::Reversed { joints: 0 })
-                    || misreading.typed_change().is_some()
-                    || rms <= MAX_PART_OF_SPREAD * spread;
-                return (rms.is_finite() && is_followed).then_some(outcome);
-            }
-            let end = fitting.run(&fitting.registered().ok()?).ok()?;
+            let registered = fitting.registered_to(TRIAL_TOLERANCE).ok()?;
+            let rms = self.error(fitting, rows, &registered);
+            // An arm that a misreading shrinks to a point misses points by their spread, which
+            // explains nothing, however small the spread is.
+            let points = &fitting.measurements.positions;
+            let spread = spread(fitting.placement, rows, |place| points[rows[place]]);
+            let is_followed = !fitting.measurements.leading().is_position()
+                || matches!(misreading.kind, Kind::Declared | Kind::Typed)
+                || rms <= MAX_PART_OF_SPREAD * spread;
+            (rms.is_finite() && is_followed).then_some(rms)
+        })
+    }
+
+    /// Returns the result of a full fit with a misreading corrected; `None` if it cannot be corrected
+    /// or fitted.
+    pub(super) fn outcome(&self, misreading: &Misreading) -> Option<Outcome> {
+        self.with_corrected(misreading, true, |fitting, corrected| {
+            let end = fitting.refitted()?;
             let (model, x) = (fitting.model, &end.x);
-            let rms = self.penalised(fitting, rows, x);
+            let rms = self.penalised(fitting, &fitting.split.identification, x);
             let value = |name: &str| {
                 let place = model.parameters.iter().position(|parameter| parameter.name == name)?;
                 Some(x[place])
             };
-            let name = misreading.size(0.0).map(|(name, _)| name);
-            let size = name.and_then(|name| Some(misreading.size(value(&name)?)?.1));
-            let left_out = Some(self.left_out(fitting, &end, corrected));
+            let of = misreading.size.as_ref();
+            let size = of.and_then(|size| Some((size.of)(value(&size.parameter)?)));
             let mut fitted = model.parameters.iter().zip(x);
             let is_within_priors = !fitted.any(|(parameter, x)| {
                 prior_sigmas(parameter, *x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
             });
-            let place = misreading.found_place(self.problem, model, x);
-            rms.is_finite().then_some(Outcome { rms, size, place, left_out, is_within_priors })
+            rms.is_finite().then(|| Outcome {
+                rms,
+                size,
+                place: misreading.found_place(self.problem, model, x),
+                left_out: self.left_out(fitting, &end, corrected),
+                is_within_priors,
+            })
         })
     }
 
@@ -362,7 +372,7 @@ impl<'a> Trial<'a> {
     /// misreading cannot be corrected.
     pub(super) fn with_corrected<R>(
         &self,
-        misreading: Misreading,
+        misreading: &Misreading,
         has_free_size: bool,
         result: impl FnOnce(&Fitting, &Problem) -> Option<R>,
     ) -> Option<R> {
@@ -375,7 +385,7 @@ impl<'a> Trial<'a> {
             .then(|| misreading.with_free_size(needs_problem.as_ref().unwrap_or(self.problem)));
         let rewritten = free.flatten().or(needs_problem);
         let joints = rewritten.as_ref().map_or(measurements.joints, |problem| problem.joints.len());
-        let rows = misreading.undone(measurements, &self.chosen, (self.problem, joints));
+        let rows = misreading.undone(measurements, &self.chosen, joints);
         let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
         let placement = Placement::of(&rows);
         let rewritten_model;
@@ -423,11 +433,7 @@ impl<'a> Trial<'a> {
         end: &FitEnd,
         problem: &Problem,
     ) -> LeftOutMisfit {
-        let whole = fitting.whole();
-        let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
-        let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();
-        let configurations = fitting.measurements.configurations(problem).0;
-        let errors = fitting.left_out_errors(&end.x, &unknowns, &configurations);
+        let errors = fitting.left_out(end, problem);
         let of_kind = Self::of_leading_kind(fitting, &fitting.split.identification);
         let errors: Vec<Vector3<f64>> = of_kind.into_iter().map(|row| errors[row]).collect();
         LeftOutMisfit {
@@ -448,21 +454,14 @@ impl<'a> Trial<'a> {
 
     /// Returns a shift of rows with its first row moved to where the error is smallest, near its
     /// present first row, and that error. Misreadings other than shifts stay as they are.
-    fn with_best_start(&self, (misreading, error): (Misreading, f64)) -> (Misreading, f64) {
+    fn with_best_start(&self, found: &(Misreading, f64)) -> (Misreading, f64) {
+        let Kind::Shifted(by, from) = found.0.kind else { return found.clone() };
         let step = shift_step(self.fitting.measurements.len());
-        let places = misreading.shifted_from().into_iter().flat_map(|from| {
-            let near = from.saturating_sub(step)..from + step;
-            let rows = self.chosen.iter().copied().filter(move |row| near.contains(row));
-            rows.map(move |from| (from, misreading))
-        });
-        let moved: Vec<Misreading> =
-            places.map(|(from, misreading)| misreading.with_shift_from(from)).collect();
-        let errors = self.registered_errors(&moved);
-        errors
-            .into_iter()
-            .chain([(misreading, error)])
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .unwrap_or((misreading, error))
+        let near = from.saturating_sub(step)..from + step;
+        let rows = self.chosen.iter().copied().filter(|row| near.contains(row));
+        let moved: Vec<Misreading> = rows.map(|from| Misreading::shifted(by, from)).collect();
+        let errors = self.registered_errors(&moved).into_iter().chain([found.clone()]);
+        errors.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_else(|| found.clone())
     }
 
     /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\]. With a
@@ -487,8 +486,8 @@ impl<'a> Trial<'a> {
         let mut squares: Vec<f64> = errors.iter().map(nalgebra::Matrix::norm_squared).collect();
         if self.fitting.loss != Loss::Squares {
             squares.sort_by(f64::total_cmp);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
-            squares.truncate(((1.0 - MAX_SET_ASIDE_SHARE) * squares.len() as f64).ceil() as usize);
+            let kept = (1.0 - MAX_SET_ASIDE_SHARE) * squares.len() as f64;
+            squares.truncate(whole(kept.ceil()));
         }
         squares.iter().sum::<f64>() / squares.len().max(1) as f64
     }

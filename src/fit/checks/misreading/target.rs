@@ -7,6 +7,7 @@ use super::search::Trial;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::parameter_limits::{MAX_PRIOR_SIGMAS, prior_sigmas};
 use crate::model::parameter::ParameterSite;
+use crate::numeric::root_mean;
 
 impl CheckedFit<'_> {
     /// Returns the place of the target of `[tool]` in its frame \[m\] from a fit without its prior,
@@ -19,8 +20,8 @@ impl CheckedFit<'_> {
         if !self.has_further_fits || !self.problem.targets.is_empty() {
             return None;
         }
-        Trial::new(self).with_corrected(Misreading::HeldTarget, false, |fitting, _| {
-            let end = fitting.run(&fitting.registered().ok()?).ok()?;
+        Trial::new(self).with_corrected(&Misreading::held_target(), false, |fitting, _| {
+            let end = fitting.refitted()?;
             let mut target = self.problem.tool.target;
             let mut is_far = false;
             for (parameter, x) in fitting.model.parameters.iter().zip(&end.x) {
@@ -41,8 +42,7 @@ impl CheckedFit<'_> {
             }
             let rows = &fitting.split.identification;
             let errors = fitting.position_errors(rows, &end.x);
-            let squares: f64 = errors.iter().map(nalgebra::Matrix::norm_squared).sum();
-            Some((target, (squares / rows.len().max(1) as f64).sqrt()))
+            Some((target, root_mean(errors.iter().map(nalgebra::Matrix::norm_squared))))
         })
     }
 }

@@ -1,13 +1,13 @@
 //! Search for two mistakes at once: two misreadings, or one misreading and some wrong rows.
 
-use super::Misreading;
 use super::explanation::Explanation;
-use super::search::{MAX_EXPLAINED_RATIO, TRIAL_TOLERANCE, Trial, near_misreadings};
+use super::search::{MAX_EXPLAINED_RATIO, TRIAL_TOLERANCE, Trial, near_errors};
+use super::{Kind, Misreading};
 use crate::fit::checks::checked_fit::CheckedFit;
-use crate::fit::checks::row_kind::listed;
+use crate::fit::checks::row_kind::listed_up_to;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::Split;
-use crate::numeric::{median, parallel};
+use crate::numeric::{median, parallel, root_mean, whole};
 use crate::problem::Problem;
 
 /// Maximum number of rows, evenly spaced, by which pairs of misreadings are ranked.
@@ -27,28 +27,19 @@ const MAX_LISTED: usize = 4;
 
 /// Rows that are wrong with a misreading corrected, by their places among the chosen ones, with the
 /// rms error of the registered nominal arm at the others \[m\].
-struct Trimmed {
-    misreading: Misreading,
+struct Trimmed<'m> {
+    misreading: &'m Misreading,
     wrong: Vec<usize>,
     error: f64,
 }
 
 impl Misreading {
     /// Returns true for a misreading that often comes with another one.
-    fn is_usual(self) -> bool {
-        match self {
-            Self::Reversed { joints } => joints.is_power_of_two(),
-            Self::Zero { degrees, .. } => degrees % 90 == 0,
-            Self::Mirrored { .. }
-            | Self::Exchanged { .. }
-            | Self::Degrees
-            | Self::Radians
-            | Self::MixedUnits { .. }
-            | Self::PositionUnit { unit: 0 }
-            | Self::Metres
-            | Self::Millimetres
-            | Self::StandardForm
-            | Self::ModifiedForm => true,
+    fn is_usual(&self) -> bool {
+        match self.kind {
+            Kind::Reversed(joints) => joints.is_power_of_two(),
+            Kind::Zero(_, degrees) => degrees % 90 == 0,
+            Kind::Mirrored | Kind::Usual | Kind::UsualUnit(_) => true,
             _ => false,
         }
     }
@@ -78,32 +69,36 @@ impl Trial<'_> {
 
     /// Returns the pairs of usual misreadings among those `tested` that leave less than `limit` \[m\]
     /// after a full fit, best first. `few` is the same trial with fewer rows, which ranks them.
-    fn explained_by_two(&self, few: &Trial, tested: &[Misreading], limit: f64) -> Vec<Explanation> {
-        let usual: Vec<Misreading> =
-            tested.iter().copied().filter(|misreading| misreading.is_usual()).collect();
+    fn explained_by_two<'m>(
+        &self,
+        few: &Trial,
+        tested: &'m [Misreading],
+        limit: f64,
+    ) -> Vec<Explanation> {
+        let usual: Vec<&Misreading> = tested.iter().filter(|of| of.is_usual()).collect();
         let places: Vec<usize> = (0..usual.len()).collect();
         let of_first = |&place: &usize| {
             few.with_corrected(usual[place], false, |fitting, problem| {
                 let inner = Trial::of_rows(fitting, problem, fitting.split.identification.clone());
-                let error = |second: &Misreading| {
-                    let is_other = second.group() != usual[place].group();
-                    let error = inner.outcome(*second, false).filter(|_| is_other)?.rms;
-                    Some(([usual[place], *second], error))
+                let error = |&second: &&'m Misreading| {
+                    let is_other = second.key() != usual[place].key();
+                    let error = inner.registered_error(second).filter(|_| is_other)?;
+                    Some(([usual[place], second], error))
                 };
                 Some(usual[place + 1..].iter().filter_map(error).collect::<Vec<_>>())
             })
         };
         let pairs = parallel::map_items(&places, of_first);
-        let mut pairs: Vec<([Misreading; 2], f64)> =
+        let mut pairs: Vec<([&Misreading; 2], f64)> =
             pairs.into_iter().flatten().flatten().collect();
         pairs.sort_by(|a, b| a.1.total_cmp(&b.1));
         pairs.truncate(MAX_FITTED_PAIRS);
-        let explained = |([first, second], _): &([Misreading; 2], f64)| {
-            let explained = self.with_corrected(*first, false, |fitting, problem| {
+        let explained = |([first, second], _): &([&Misreading; 2], f64)| {
+            let explained = self.with_corrected(first, false, |fitting, problem| {
                 let inner = Trial::of_rows(fitting, problem, fitting.split.identification.clone());
-                inner.explained(&[*second], limit).into_iter().next()
+                inner.explained(std::slice::from_ref(*second), limit).into_iter().next()
             })?;
-            let first = first.described(None, self.problem);
+            let first = first.described(None);
             Some(Explanation { words: format!("{first}, and {}", explained.words), ..explained })
         };
         let mut explained: Vec<Explanation> = pairs.iter().filter_map(explained).collect();
@@ -115,20 +110,19 @@ impl Trial<'_> {
     /// Returns the misreading among the first of `errors` that explains most rows where the others
     /// are wrong, after a full fit without these.
     fn explained_without_rows(&self, errors: &[(Misreading, f64)]) -> Option<Explanation> {
-        let as_read = self.trimmed(Misreading::Reversed { joints: 0 })?.error;
-        let leaves_rows_out = |misreading: &Misreading| {
-            matches!(misreading, Misreading::Shifted { .. } | Misreading::TextOrder { .. })
-        };
-        let tried = errors.iter().map(|(misreading, _)| *misreading);
+        let declared = Misreading::none();
+        let as_read = self.trimmed(&declared)?.error;
+        let leaves_rows_out =
+            |of: &Misreading| matches!(of.kind, Kind::Shifted(..) | Kind::TextOrder);
+        let tried = errors.iter().map(|(misreading, _)| misreading);
         let tried = tried.filter(|misreading| !leaves_rows_out(misreading)).take(MAX_TRIMMED);
-        let trimmed =
-            parallel::map_items(&tried.collect::<Vec<_>>(), |&misreading| self.trimmed(misreading));
+        let trimmed = parallel::map_items(&tried.collect::<Vec<_>>(), |&of| self.trimmed(of));
         let mut trimmed: Vec<Trimmed> = trimmed.into_iter().flatten().collect();
         trimmed.sort_by(|a, b| a.error.total_cmp(&b.error));
-        let ranked: Vec<(Misreading, f64)> =
-            trimmed.iter().map(|of| (of.misreading, of.error)).collect();
-        let near = near_misreadings(&ranked, as_read);
-        let best = trimmed.first().filter(|of| near.contains(&of.misreading))?;
+        let errors: Vec<f64> = trimmed.iter().map(|of| of.error).collect();
+        let near = &trimmed[..near_errors(&errors, as_read)];
+        let best = near.first()?;
+        let near: Vec<Misreading> = near.iter().map(|of| of.misreading.clone()).collect();
         let wrong = best.wrong.clone();
         if wrong.is_empty() {
             return None;
@@ -145,14 +139,14 @@ impl Trial<'_> {
         let words = format!(
             "{}, and without the {noun} {}, which {verb} wrong besides",
             best.words,
-            listed(&places, MAX_LISTED)
+            listed_up_to(&places, MAX_LISTED)
         );
         Some(Explanation { words, ..best })
     }
 
     /// Registers the nominal arm with a misreading corrected to most rows, those that it leaves
     /// nearest, again and again.
-    fn trimmed(&self, misreading: Misreading) -> Option<Trimmed> {
+    fn trimmed<'m>(&self, misreading: &'m Misreading) -> Option<Trimmed<'m>> {
         self.with_corrected(misreading, false, |fitting, _: &Problem| {
             let Fitting { placement, model, measurements, .. } = *fitting;
             let rows = fitting.leading_rows();
@@ -169,20 +163,14 @@ impl Trial<'_> {
                 lengths =
                     rows.iter().zip(errors).map(|(&row, error)| (row, error.norm())).collect();
                 lengths.sort_by(|a: &(usize, f64), b| a.1.total_cmp(&b.1));
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "a count"
-                )]
-                let count = (KEPT_SHARE * rows.len() as f64).ceil() as usize;
+                let count = whole((KEPT_SHARE * rows.len() as f64).ceil());
                 kept = lengths.iter().take(count).map(|(row, _)| *row).collect();
                 kept.sort_unstable();
             }
             let limit = MIN_WRONG_RATIO * median(lengths.iter().map(|(_, length)| *length))?;
             let first_wrong = lengths.partition_point(|(_, length)| *length <= limit);
             let (kept, wrong) = lengths.split_at(first_wrong);
-            let squares: f64 = kept.iter().map(|(_, length)| length.powi(2)).sum();
-            let error = (squares / kept.len().max(1) as f64).sqrt();
+            let error = root_mean(kept.iter().map(|(_, length)| length.powi(2)));
             let mut wrong: Vec<usize> = wrong.iter().map(|(row, _)| *row).collect();
             wrong.sort_unstable();
             Some(Trimmed { misreading, wrong, error })

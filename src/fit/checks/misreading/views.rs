@@ -10,10 +10,10 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 
 use super::Misreading;
-use super::candidates::candidates;
+use super::candidates::of_arm;
 use super::explanation::Explanations;
 use super::images::{is_of_views, of_images};
-use super::reversed::MAX_REVERSED;
+use super::reversed::several_reversed;
 use super::search::{MAX_EXPLAINED_RATIO, Trial, explanations, near_misreadings};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::checks::checked_fit::CheckedFit;
@@ -22,7 +22,7 @@ use crate::fit::checks::row_kind::spread;
 use crate::fit::checks::view_order::views;
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::stages::stage::StageError;
-use crate::numeric::parallel;
+use crate::numeric::{parallel, spaced};
 use crate::problem::Problem;
 
 /// Maximum number of views, evenly spaced, to which misreadings are applied.
@@ -95,7 +95,7 @@ pub(in crate::fit) fn with_readings(
             if is_of_views(fitting.measurements) =>
         {
             let near = near_in_views(fitting, problem).near;
-            let readings = near.iter().take(MAX_FITTED).map(|found| found.described(None, problem));
+            let readings = near.iter().take(MAX_FITTED).map(|found| found.described(None));
             let readings = readings.collect();
             error.location.error(InputErrorKind::PointBehindCamera { fits, miss, few, readings })
         }
@@ -121,36 +121,27 @@ fn near_in_views(fitting: &Fitting, problem: &Problem) -> Explanations {
     let pixels = spread(fitting.placement, &rows, |place| table.positions[rows[place]]);
     let trial = Trial::of_rows(fitting, problem, rows);
     // The nominal arm with camera and marker located in closed form.
-    let error = |misreading: Misreading| {
+    let error = |misreading: &Misreading| {
         trial.with_corrected(misreading, false, |fitting, _| {
             Some(fitting.typical_error(&fitting.located()))
         })
     };
-    let mut tested = candidates(problem, table);
-    tested.retain(|misreading| misreading.concerns_arm());
-    let joint = |misreading: &Misreading| match misreading {
-        Misreading::Reversed { joints } => Some(*joints),
-        _ => None,
-    };
-    let joints: Vec<u64> = tested.iter().filter_map(joint).take(MAX_REVERSED).collect();
-    let set = |bits: u64| -> u64 {
-        joints.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1).map(|(_, joint)| joint).sum()
-    };
-    let sets = (1..1_u64 << joints.len()).filter(|bits| bits.count_ones() > 1).map(set);
-    tested.extend(sets.map(|joints| Misreading::Reversed { joints }));
+    let mut tested = of_arm(problem, table);
+    tested.extend(several_reversed(&tested));
     tested.extend(of_images(problem, table));
-    let errors = parallel::map_items(&tested, |&misreading| Some((misreading, error(misreading)?)));
+    let errors = parallel::map_items(&tested, |of| Some((of.clone(), error(of)?)));
     let mut errors: Vec<(Misreading, f64)> = errors.into_iter().flatten().collect();
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let as_declared = error(Misreading::Reversed { joints: 0 }).unwrap_or(f64::INFINITY);
+    let as_declared = error(&Misreading::none()).unwrap_or(f64::INFINITY);
     let near_error = errors.first().map_or(f64::NAN, |(_, error)| *error);
     if near_error.is_nan() || near_error > MAX_NOMINAL_MISS * pixels {
         return Explanations::default();
     }
     let mut near = near_misreadings(&errors, as_declared);
     // Joints whose sign has no effect on the images, as that of a joint that stands still, stay out.
-    let smallest = near.iter().filter_map(joint).map(u64::count_ones).min();
-    near.retain(|found| joint(found).is_none_or(|set| Some(set.count_ones()) == smallest));
+    let count = |found: &Misreading| found.reversed_joints().count_ones();
+    let smallest = near.iter().map(count).filter(|count| *count > 0).min();
+    near.retain(|found| count(found) == 0 || Some(count(found)) == smallest);
     Explanations { near, near_error, ..Explanations::default() }
 }
 
@@ -159,7 +150,6 @@ fn rows_of_views(fitting: &Fitting) -> Vec<usize> {
     let rows = &fitting.split.identification;
     let mut views = views(fitting.measurements, rows);
     views.retain(|view| view.len() >= MIN_POINTS);
-    let step = views.len().div_ceil(MAX_VIEWS).max(1);
     let outermost = |view: &Vec<usize>| -> Vec<usize> {
         let along = |direction: u8| {
             let (y, x) = (TAU * f64::from(direction) / f64::from(DIRECTIONS)).sin_cos();
@@ -171,33 +161,7 @@ fn rows_of_views(fitting: &Fitting) -> Vec<usize> {
         };
         (0..DIRECTIONS).filter_map(along).collect()
     };
-    let places: BTreeSet<usize> = views.iter().step_by(step).flat_map(outermost).collect();
+    let views = spaced(views, MAX_VIEWS);
+    let places: BTreeSet<usize> = views.iter().flat_map(outermost).collect();
     places.into_iter().map(|place| rows[place]).collect()
-}
-
-impl Misreading {
-    /// Returns true if the misreading concerns the joint table or the columns of the joints.
-    fn concerns_arm(self) -> bool {
-        self.concerns_problem()
-            || matches!(
-                self,
-                Self::Degrees
-                    | Self::Radians
-                    | Self::TurnUnit { .. }
-                    | Self::MixedUnits { .. }
-                    | Self::Slides { .. }
-                    | Self::ArmInMillimetres
-                    | Self::Reversed { .. }
-                    | Self::OppositeOrder
-                    | Self::Alphabetical
-                    | Self::Rotated { .. }
-                    | Self::Exchanged { .. }
-                    | Self::Cycled { .. }
-                    | Self::ExchangedPairs { .. }
-                    | Self::Coupled { .. }
-                    | Self::Screw { .. }
-                    | Self::Zero { .. }
-                    | Self::Ratio { .. }
-            )
-    }
 }
