@@ -358,6 +358,16 @@ class ClosedLoop(Fit):
     def _fit_of(self, words: dict[str, Any]) -> Any:
         return Restored(words, self._spec.part("after"))
 
+    def summary(self) -> str:
+        """What the command line prints with ``-v``, and what may be done if structure is left."""
+        said = super().summary()
+        if self.verdict != "unexplained":
+            return said
+        return (
+            f"{said}\nNext: trace() of the closed_problem ranks candidates for what is left; a law can be declared by hand ([[effect]] law), or "
+            "identify(remainder=True) corrects it without a law. after.trusted does not mean that all is explained.\n"
+        )
+
     @property
     def verdict(self) -> str:
         """``"explained"`` (the effects with status ``"found"`` alone leave noise), ``"unexplained"`` (structure is left, or no

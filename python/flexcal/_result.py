@@ -59,7 +59,7 @@ class Result:
         self._core = Restored(state["said"], None)
 
     def summary(self) -> str:
-        """What the command line prints (``identify`` and ``loop`` with ``-v``), as text."""
+        """What the command line prints (``identify``, ``loop`` and ``check`` with ``-v``), as text."""
         return str(self._core.summary())
 
     def to_json(self) -> str:

@@ -35,6 +35,9 @@ pub struct Arguments {
     poses: Option<u32>,
     #[command(flatten)]
     source: Source,
+    /// Print every table: standard errors, other numbers of poses, sizes of effects
+    #[arg(short, long, conflicts_with_all = ["quiet", "json"])]
+    verbose: bool,
 }
 
 /// Error of arguments that name no poses, or contradictory ones.
@@ -89,17 +92,30 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let next = if check.suffices() && is_measured {
             format!("flexcal identify {} fits these measurements", common.problem_arguments())
         } else if check.suffices() {
-            format!("measure such poses, then flexcal loop {problem_word} --data MEASURED.csv")
+            next_if_drawn(&problem, &problem_word)
         } else {
             format!("flexcal plan {problem_word} --poses N chooses poses that tell more")
         };
-        format!("{}{turns}{}Next: {next}\n", story.text(), results.written())
+        let told =
+            if arguments.verbose { story.text() } else { report::check_brief(&problem, &check) };
+        format!("{told}{turns}{}Next: {next}\n", results.written())
     })?;
     if check.suffices() {
         return Ok(Outcome::Done);
     }
     diagnostic::warn(&report::why_not_sufficient(&check));
     Ok(Outcome::NotMet)
+}
+
+/// Returns the next step after poses that were not measured yet, or that are drawn although the
+/// tables of the problem are there.
+fn next_if_drawn(problem: &Problem, problem_word: &str) -> String {
+    let files = &problem.data.files;
+    if !files.is_empty() && files.iter().all(|file| file.exists()) {
+        return format!("flexcal loop {problem_word} fits the tables that [data] names");
+    }
+    let log = if problem.data.joint_log.is_some() { " --joints LOG.csv" } else { "" };
+    format!("measure such poses, then flexcal loop {problem_word} --data MEASURED.csv{log}")
 }
 
 /// Largest sine of the angle between two parallel directions.
@@ -121,7 +137,7 @@ fn slides_along_gravity(problem: &Problem) -> Option<&'static str> {
 
 /// Returns the poses to check that the arguments name, drawn from ranges or read from tables.
 fn checked_poses(arguments: &Arguments, problem: &Problem) -> Result<CheckedPoses, Box<dyn Error>> {
-    let Arguments { common, poses, source } = arguments;
+    let Arguments { common, poses, source, .. } = arguments;
     let poses = poses.map(|poses| poses as usize);
     let table = source.table(problem, common)?;
     match (table, poses) {

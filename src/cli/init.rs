@@ -123,7 +123,7 @@ fn complete_sheet(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
         (problem, sheet.text.into())
     };
-    flags.warn(&problem.warnings);
+    flags.warn(&problem.plausibility_warnings());
     let description = complete(&problem, &text)?;
     let results =
         flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;

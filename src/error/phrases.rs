@@ -221,3 +221,48 @@ pub(super) fn compared_keys(keys: Option<&[String; 2]>) -> String {
         format!(" (the measurements have {measured}, the joint table {joints})")
     })
 }
+
+/// Returns a clause that names the further rows that repeat others.
+pub(super) fn repeated_rows(rows: usize, named: &[String]) -> String {
+    let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
+    let left = and_more(left);
+    let named = named.join(", ");
+    match further {
+        0 => String::new(),
+        1 => format!(", and 1 further row repeats another ({named})"),
+        _ => format!(", and {further} further rows repeat others ({named}{left})"),
+    }
+}
+
+/// Returns a clause that names the further rows of which a warning is true.
+pub(super) fn further_rows(rows: usize, named: &[String]) -> String {
+    let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
+    let left = and_more(left);
+    match further {
+        0 => String::new(),
+        1 => format!(", as does {}", named.join(", ")),
+        _ => format!(", as do {further} further rows ({}{left})", named.join(", ")),
+    }
+}
+
+/// Returns a clause that counts the further rows of which a warning is true.
+pub(super) fn additional_rows(rows: usize) -> String {
+    if rows > 1 {
+        format!(", and in {} further row{}", rows - 1, plural(rows - 1))
+    } else {
+        String::new()
+    }
+}
+
+/// Returns the hint for a column that does not resemble a known one.
+pub(super) fn covariate_hint(meant: Option<&str>, is_angle: bool) -> &'static str {
+    match (meant, is_angle) {
+        (Some(_), _) => "",
+        (None, true) => {
+            " (if it is a joint of the arm, its [[joint]] is missing: from a URDF, flexcal init \
+             with another --tip adds it; if the arm may only depend on it, name it in \
+             [data.covariates])"
+        }
+        (None, false) => " (name it in [data.covariates] if the arm may depend on it)",
+    }
+}

@@ -14,9 +14,12 @@ pub enum UrdfErrorKind {
     #[error("the column has no unit; write {write} in the header")]
     SheetUnit { write: String },
     #[error(
-        "{found} is no unit of this column; write {write} in the header, and convert the numbers"
+        "{found} is no unit of this column; write {write} in the header, and convert the \
+         numbers{factor}"
     )]
-    SheetOtherUnit { found: String, write: String },
+    SheetOtherUnit { found: String, write: String, factor: String },
+    #[error("the table has no column of the twist angle α; add alpha_deg")]
+    SheetWithoutAlpha,
     #[error("another column states {key} in this row, too; keep one of the two")]
     SheetTwice { key: &'static str },
     #[error("\"{cell}\" is not a number, nor a coordinate with its constant part such as q2 - 90")]

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::near::did_you_mean;
-use super::phrases::{and_more, plural};
+use super::phrases::{
+    additional_rows, and_more, covariate_hint, further_rows, plural, repeated_rows,
+};
 
 /// Kind of a warning, with its cause and remedy as message.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -68,6 +70,12 @@ pub enum WarningKind {
          = \"{write}\" in [data.format]"
     )]
     PositionZero { write: String },
+    #[error(
+        "{value} mm lies {far} m from the middle of the rows, beyond the reach of the arm{}; \
+         correct the number{hint}",
+        more_rows(*rows)
+    )]
+    BeyondReach { value: String, far: String, hint: &'static str, rows: usize },
     #[error(
         "{value} px is outside the image of the camera \"{camera}\", image_px = [{}, {}]; correct \
          image_px, which plans and exports use{}",
@@ -262,12 +270,12 @@ pub enum WarningKind {
     LimitsLookLikeRadians { widest: String },
     #[error("{what} of {turns} turns; if it is in degrees, write {write}")]
     AngleLooksLikeDegrees { what: &'static str, turns: String, write: String },
+    #[error("columns not taken: {names}; taken: {taken}, of theta, alpha, d, a, min, max")]
+    SheetColumns { names: String, taken: String },
     #[error(
-        "columns not taken: {}; taken: {}. A column is known by a name such as theta_deg, d_mm, \
-         a_mm, alpha_deg, min_deg, max_deg",
-        names.join(", "), taken.join(", ")
+        "no length is above {longest} mm; if they are in metres, write d_m and a_m in the header"
     )]
-    SheetColumns { names: Vec<String>, taken: Vec<String> },
+    SheetInMetres { longest: String },
     #[error(
         "a focal length of {focal} px is short for an image that is {width} px wide; if it is in \
          millimetres, divide it by the size of a pixel in millimetres"
@@ -406,58 +414,15 @@ impl WarningKind {
         matches!(self, Self::NoPayloadColumn { .. })
     }
 
-    /// Returns true if no arm can have been in the state that the table states.
+    /// Returns true if no arm can have been in a state that the table states.
     #[doc(hidden)]
     pub const fn refutes_table(&self) -> bool {
-        matches!(self, Self::Kelvins { .. })
+        matches!(self, Self::Kelvins { .. } | Self::BeyondReach { .. })
     }
 }
 
 fn declared_mass_hint(arm: Option<&str>) -> String {
     arm.map_or_else(String::new, |arm| format!(", whose declared masses add up to {arm} kg"))
-}
-
-fn repeated_rows(rows: usize, named: &[String]) -> String {
-    let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
-    let left = and_more(left);
-    let named = named.join(", ");
-    match further {
-        0 => String::new(),
-        1 => format!(", and 1 further row repeats another ({named})"),
-        _ => format!(", and {further} further rows repeat others ({named}{left})"),
-    }
-}
-
-/// Returns a clause that names the further rows of which a warning is true.
-fn further_rows(rows: usize, named: &[String]) -> String {
-    let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
-    let left = and_more(left);
-    match further {
-        0 => String::new(),
-        1 => format!(", as does {}", named.join(", ")),
-        _ => format!(", as do {further} further rows ({}{left})", named.join(", ")),
-    }
-}
-
-fn additional_rows(rows: usize) -> String {
-    if rows > 1 {
-        format!(", and in {} further row{}", rows - 1, plural(rows - 1))
-    } else {
-        String::new()
-    }
-}
-
-/// Returns the hint for a column that does not resemble a known one.
-fn covariate_hint(meant: Option<&str>, is_angle: bool) -> &'static str {
-    match (meant, is_angle) {
-        (Some(_), _) => "",
-        (None, true) => {
-            " (if it is a joint of the arm, its [[joint]] is missing: from a URDF, flexcal init \
-             with another --tip adds it; if the arm may only depend on it, name it in \
-             [data.covariates])"
-        }
-        (None, false) => " (name it in [data.covariates] if the arm may depend on it)",
-    }
 }
 
 /// Returns the remedy for rows without a partner whose names differ from one only in spelling:

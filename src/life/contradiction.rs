@@ -91,27 +91,23 @@ impl Contradiction {
             }
             (true, None) => String::new(),
         };
-        let still = if index == 0 { "" } else { "besides the causes named before: " };
         let cause = if self.noise_ratio.is_some() {
             let what = if index == 0 { "them" } else { "the rest" };
-            format!("{still}no change that was tried explains {what} as well as {}", self.label)
+            format!("no change that was tried explains {what} as well as {}", self.label)
         } else {
             let probability = 100.0 * self.probability;
-            format!(
-                "{still}most probable of the changes tried: {} ({probability:.0} %)",
-                self.label
-            )
+            format!("most probable of the changes tried: {} ({probability:.0} %)", self.label)
         };
-        let text = format!(
-            "the new rows contradict {} (a false alarm in at most one of 100 fits); \
-             {cause}{treatment}",
-            file.display()
-        );
+        let more = match index {
+            0 => " (a false alarm in at most one of 100 fits)",
+            _ => " in more than was named before",
+        };
+        let text = format!("the new rows contradict {}{more}; {cause}{treatment}", file.display());
         let numbers = [json!(self.label), self.probability.into(), json!(is_refitted)];
         let remedy = if is_of_fleet {
             "find how this arm differs from those of the fleet"
         } else {
-            "find what happened to the arm since that estimate (flexcal watch tells)"
+            "find what happened to the arm since that estimate (flexcal watch looks for it)"
         };
         Finding::new(FindingCode::EarlierEstimateContradicted, numbers, text)
             .with_remedy(remedy.to_owned())

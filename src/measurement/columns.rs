@@ -334,7 +334,12 @@ impl Columns {
     }
 
     /// Returns the error of a column `base` in a unit that files cannot have; `None` without one.
-    fn in_foreign_unit(&self, table: &Table, base: &str, unit: Unit) -> Option<InputError> {
+    pub(super) fn in_foreign_unit(
+        &self,
+        table: &Table,
+        base: &str,
+        unit: Unit,
+    ) -> Option<InputError> {
         let of_base = |name: &String| {
             let suffix = name.strip_prefix(base)?.strip_prefix('_')?;
             Some((suffix.to_owned(), unit.convert_foreign(suffix, 1.0)?))

@@ -23,6 +23,14 @@ const MIN_PIXEL_FOCAL: f64 = 30.0;
 /// Largest absolute coordinate of a pixel \[px\]; images are smaller by far, and a fit to one such
 /// row takes long.
 const MAX_PIXEL: f64 = 1e5;
+/// Smallest distance of a position from the middle of the others, as a multiple of the length of
+/// the arm, that no arm reaches. From one end of its workspace to the other it is twice the length.
+const MIN_REACHES: f64 = 3.0;
+/// Minimum number of rows for each one that is beyond reach; where more are, the table is misread.
+const MIN_ROWS_TO_ONE_FAR: usize = 10;
+/// Largest distance of a pixel beyond the centres of those at the edge of its image that is not
+/// asked about \[px\]: half a pixel, and noise of corners at the edge.
+const IMAGE_EDGE: f64 = 2.5;
 /// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
 /// \[m\].
 const MIN_TURN: f64 = std::f64::consts::PI / 180.0;
@@ -46,7 +54,9 @@ impl Measurements {
             .or_else(|| self.rounded_copies(problem));
         let held = self.held_positions(problem);
         let outside = self.pixels_outside(problem).or_else(|| self.other_resolution(problem));
-        repeated.into_iter().chain(held).chain(self.time_going_back()).chain(outside).collect()
+        let far = self.beyond_reach(problem);
+        let doubts = repeated.into_iter().chain(held).chain(self.time_going_back());
+        doubts.chain(outside).chain(far).collect()
     }
 
     /// Checks that the rows do not all show markers at rest in the images of cameras at rest.
@@ -132,15 +142,57 @@ impl Measurements {
         Err(self.location(0).error(kind))
     }
 
+    /// Returns a warning at the first of few positions that lie farther from the middle of the
+    /// others of their session than the arm reaches, such as one whose decimal point was lost.
+    fn beyond_reach(&self, problem: &Problem) -> Option<Warning> {
+        let targets = problem.targets.iter().map(|target| target.at.norm());
+        let target = targets.fold(problem.tool.target.norm(), f64::max);
+        let reach = MIN_REACHES * (problem.length_of_links() + target);
+        let is_position = |row: &usize| self.observation(*row) == Observation::default();
+        let rows: Vec<usize> = (0..self.positions.len()).filter(is_position).collect();
+        let session = |row: usize| self.session.of_row.get(row).copied().unwrap_or(0);
+        let mut middles: BTreeMap<usize, [Vec<f64>; 3]> = BTreeMap::new();
+        for &row in &rows {
+            let axes = middles.entry(session(row)).or_default();
+            axes.iter_mut().zip(self.positions[row].iter()).for_each(|(axis, x)| axis.push(*x));
+        }
+        let middles: BTreeMap<usize, Vector3<f64>> = middles
+            .into_iter()
+            .map(|(session, mut axes)| {
+                axes.iter_mut().for_each(|axis| axis.sort_by(f64::total_cmp));
+                (session, Vector3::from(axes.map(|axis| axis[axis.len() / 2])))
+            })
+            .collect();
+        let off = |row: &usize| self.positions[*row] - middles[&session(*row)];
+        let far: Vec<usize> = rows.iter().copied().filter(|row| off(row).norm() > reach).collect();
+        let &row = far.first().filter(|_| {
+            reach.is_finite() && reach > 0.0 && MIN_ROWS_TO_ONE_FAR * far.len() <= rows.len()
+        })?;
+        let (axis, offset) = (off(&row).iamax(), off(&row).amax());
+        let value = self.positions[row][axis];
+        let middle = value - off(&row)[axis];
+        let is_lost = |power: &i32| (value / 10_f64.powi(*power) - middle).abs() < reach / 2.0;
+        let hint =
+            if (1..=6).any(|power| is_lost(&power)) { ": is a decimal point lost?" } else { "" };
+        let kind = WarningKind::BeyondReach {
+            value: ((value * 1e6).round() / 1e3).to_string(),
+            far: format!("{offset:.0}"),
+            hint,
+            rows: far.len(),
+        };
+        let column = ["column x_mm", "column y_mm", "column z_mm"].get(axis).copied()?;
+        Some(Warning { location: self.location(row).with_key(column), kind })
+    }
+
     /// Returns a warning at the first pixel that lies outside the declared size of its image.
     fn pixels_outside(&self, problem: &Problem) -> Option<Warning> {
         let outside = |row: usize| {
             let Observation::Pixel(camera, ..) = self.observation(row) else { return None };
             let camera = problem.fixtures.get(camera as usize)?;
             let (image, pixel) = (camera.image?, self.positions.get(row)?);
-            // A pixel's centre is at whole numbers, so that the image begins at −0.5.
-            let is_outside =
-                |value: f64, size: f64| value.is_finite() && !(-0.5..=size - 0.5).contains(&value);
+            let is_outside = |value: f64, size: f64| {
+                value.is_finite() && !(-IMAGE_EDGE..=size - 1.0 + IMAGE_EDGE).contains(&value)
+            };
             let [width, height] = image;
             let axes = [("column u_px", pixel.x, width), ("column v_px", pixel.y, height)];
             let (column, value, _) =

@@ -1,6 +1,7 @@
 //! Warnings about implausible commands, conditions and repeated poses.
 
 use std::collections::HashMap;
+use std::f64::consts::TAU;
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
@@ -251,7 +252,7 @@ impl Measurements {
         let (column, row) = cells.max_by(|(a, i), (b, j)| {
             value(*i, a.joint).abs().total_cmp(&value(*j, b.joint).abs())
         })?;
-        let turns = value(row, column.joint).abs() / std::f64::consts::TAU;
+        let turns = value(row, column.joint).abs() / TAU;
         let kind = WarningKind::ManyTurns {
             value: format!("{} = {}", column.name, column.shown(value(row, column.joint))),
             turns: format!("{turns:.0}"),
@@ -285,15 +286,28 @@ impl Measurements {
             // The iterator is reversed so that the first of equals wins.
             let worst = *rows.iter().rev().max_by(|&&a, &&b| beyond(a).total_cmp(&beyond(b)))?;
             let location = self.location(worst).with_key(format!("joint {}", column.joint + 1));
-            let ratio = value(worst).abs() / min.abs().max(max.abs());
+            let widest = min.abs().max(max.abs());
+            let ratio = value(worst).abs() / widest;
+            // Limits of a URDF in radians, written as degrees: as radians they hold all commands.
+            let [lower, upper] = [min, max].map(f64::to_degrees);
+            let are_radians = widest.to_degrees() <= TAU
+                && (0..self.len()).all(|row| (lower..=upper).contains(&value(row)));
             let other_unit = match column.unit() {
                 "m" if ratio > MIN_MILLIMETRE_RATIO => Some("millimetres"),
-                "deg" if ratio > MIN_COUNTS_RATIO => Some("counts of an encoder"),
+                "deg" if ratio > MIN_COUNTS_RATIO && !are_radians => Some("counts of an encoder"),
                 _ => None,
+            };
+            let radians = || {
+                format!(
+                    "if the limits are in radians, write min_rad = {} and max_rad = {}",
+                    column.shown(min),
+                    column.shown(max)
+                )
             };
             let kind = WarningKind::BeyondLimits {
                 other_unit: other_unit
-                    .map(|unit| format!("{ratio:.0} times the limit: are these {unit}?")),
+                    .map(|unit| format!("{ratio:.0} times the limit: are these {unit}?"))
+                    .or_else(|| (column.unit() == "deg" && are_radians).then(radians)),
                 rows: rows.len(),
                 worst: format!("{} = {}", column.name, column.shown(value(worst))),
                 limits: column.limits((min, max)),

@@ -13,7 +13,7 @@ use super::table::Table;
 use super::{ColumnTable, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
 use crate::files::{same_file, was_changed};
-use crate::problem::{JoinRule, JointLog, Missing, Problem};
+use crate::problem::{Dialect, JoinRule, JointLog, Missing, Problem};
 
 impl Measurements {
     /// Reads files one after the other; also returns warnings, for example about ignored columns.
@@ -251,7 +251,11 @@ impl<'a> Tables<'a> {
             self.problem,
             (self.measured, self.is_mapped_whole),
             &mut ignored,
-        )?;
+        )
+        .map_err(|error| match joint_log.filter(|_| self.joins && !is_joined) {
+            Some(declared) => of_exchanged_tables(error, declared, dialect),
+            None => error,
+        })?;
         observed::check_target_column(&table, &columns, self.problem)?;
         if !table.next_row()? {
             let line = table.line();
@@ -403,6 +407,32 @@ impl LeftOut {
         let rows = self.rows;
         self.first.map(|location| Warning { location, kind: WarningKind::RowsMissing { rows } })
     }
+}
+
+/// Returns the error of a column that a table with joints lacks, with the remedy of exchanged tables
+/// if the declared joint table has it.
+fn of_exchanged_tables(error: InputError, declared: &JointLog, dialect: &Dialect) -> InputError {
+    let InputError { location, kind } = error;
+    let kind = match *kind {
+        InputErrorKind::Table(TableErrorKind::NoSuchColumn { file, name, known, remedy }) => {
+            let log = declared.files.first();
+            let is_there = |log: &&PathBuf| {
+                let missing = || Location::file(*log).error(TableErrorKind::NoDataFiles);
+                Table::open(log, dialect, missing).is_ok_and(|log| log.header.contains(&name))
+            };
+            let remedy = match log.filter(is_there) {
+                Some(log) => Some(format!(
+                    "files and joints in [data] are exchanged: it has the joints, and {} this \
+                     column",
+                    log.display()
+                )),
+                None => remedy,
+            };
+            TableErrorKind::NoSuchColumn { file, name, known, remedy }.into()
+        }
+        kind => kind,
+    };
+    InputError { location, kind: Box::new(kind) }
 }
 
 /// Returns true if the position of the current row is the word or number that marks a missing

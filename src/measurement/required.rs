@@ -36,6 +36,11 @@ impl Columns {
                 continue;
             }
             if let Some(field) = kind.fields.iter().find(lacks) {
+                let foreign =
+                    field.unit().and_then(|unit| self.in_foreign_unit(table, field.name, unit));
+                if let Some(error) = foreign {
+                    return Err(error);
+                }
                 let write = field.unit().map_or(field.name.to_owned(), |unit| {
                     format!("{}_{}", field.name, unit.in_tables().suffix)
                 });

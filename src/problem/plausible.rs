@@ -17,7 +17,8 @@ const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 const MAX_LIMIT_RADIANS: f64 = TAU + 0.02;
 /// Largest plausible limit of a joint in radians \[turns\].
 const MAX_LIMIT_TURNS: f64 = 6.0;
-/// Largest plausible angle of the joint table in radians \[turns\]: one, with a margin for rounding.
+/// Largest plausible angle of the joint table in radians \[turns\]: one, with a margin for
+/// rounding.
 const MAX_ANGLE_TURNS: f64 = 1.01;
 /// Largest plausible distance of a fixture from the origin of the measuring frame, or between two
 /// points, as a multiple of the length of the arm's links.

@@ -63,8 +63,8 @@ impl Document {
 }
 
 /// Returns the list, inline table or text that an earlier line begins and does not close, where the
-/// line at the error, `before` and `after` it, cannot be a part of it: its place, and the mistake with
-/// its remedy.
+/// line at the error, `before` and `after` it, cannot be a part of it: its place, and the mistake
+/// with its remedy.
 fn not_closed(
     previous_lines: &str,
     (before, after): (&str, &str),
@@ -276,8 +276,9 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
 /// `word` the name.
 fn remedy_of_header(before: &str, word: &str) -> &'static str {
     if before.starts_with("[[") {
-        "if it is the first [[…]] of this name, a header above it is misspelt, and parts such as [[joint.body]] then began another \
-         section; otherwise write its lines into the first section of this name"
+        "if it is the first [[…]] of this name, a header above it is misspelt, and parts such as \
+         [[joint.body]] then began another section; otherwise write its lines into the first \
+         section of this name"
     } else if LISTS.iter().any(|list| word.starts_with(list)) {
         "joints, effects and the like are lists: write two brackets for each of them, as in \
          [[joint]], the first one too"

@@ -5,7 +5,7 @@ use super::document::{Block, Column, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, FAINT, INK, Series};
 use super::forecast::{assumptions, cells, poses_to_measure, undetermined_note};
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
-use super::render::Story;
+use super::render::{Story, text};
 use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
 use crate::problem::Problem;
@@ -38,17 +38,8 @@ pub fn check(problem: &Problem, check: &Check) -> Story {
     let sheet = rows_of_sheet(problem);
     notes.extend(sheet.as_deref());
     let noun = check.row_noun;
-    let of_poses = if noun == "pose" {
-        String::new()
-    } else {
-        format!(" in {}", counted(check.distinct_poses, "pose"))
-    };
-    let checked = counted(forecast.poses, noun);
-    let counts = format!("{}, {checked}{of_poses}", counted(names.len(), "parameter"));
-    let mut blocks = opening(&problem.title, counts).to_vec();
+    let mut blocks = head(problem, check);
     blocks.extend([
-        Block::lines(recommendation(problem, check)),
-        Block::lines(prediction_sentences(check)),
         Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&notes)),
         Block::Page(vec![conditioning(
             &forecast.identifiability,
@@ -62,11 +53,66 @@ pub fn check(problem: &Problem, check: &Check) -> Story {
         Block::Table(growth_table(check)),
         Block::figures([growth_figure(check)]),
     ]);
-    // If held-out rows are predicted, the checked poses are the fitted ones of a table.
-    let poses = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
-    blocks.extend(assumptions(problem, &forecast.expected, (poses, 0)));
+    blocks.extend(assumptions_of(problem, check));
     blocks.extend(detection::blocks(problem, &check.detection));
     Story::new(&problem.title, "check", blocks)
+}
+
+/// Returns the forecast of the command `check` on one screen, ending in a line break.
+pub fn check_brief(problem: &Problem, check: &Check) -> String {
+    let Forecast { expected, identifiability, .. } = &check.forecast;
+    let names: Vec<String> = expected.iter().map(|expected| expected.name.clone()).collect();
+    let is_well = |of: &&ExpectedParameter| of.identified >= Forecast::WELL_IDENTIFIED;
+    let well = expected.iter().filter(is_well).count();
+    let least = expected.iter().min_by(|a, b| a.identified.total_cmp(&b.identified));
+    let least = least.filter(|of| !is_well(of)).map_or_else(String::new, |least| {
+        format!("; least {} ({})", least.name, share(least).trim_start())
+    });
+    let mut blocks = head(problem, check);
+    let confounded = expected.iter().filter(|of| is_confounded_at_nominal(of)).count();
+    let confounded = match confounded {
+        0 => String::new(),
+        count => format!(", {count} of them at arms beside the nominal one alone"),
+    };
+    blocks.push(Block::lines(format!(
+        "The data identify {well} of {} to 90 % or more{confounded}{least}.",
+        counted(names.len(), "parameter")
+    )));
+    blocks.push(unidentifiable(
+        identifiability,
+        &names,
+        ("check.json", check.open_scale.as_deref()),
+    ));
+    blocks.extend(assumptions_of(problem, check));
+    blocks.extend(detection::brief(problem, &check.detection));
+    blocks.push(Block::lines(
+        "-v and check.html state the standard error of each parameter, what more or fewer poses \
+         give, and from which size on each effect is found.",
+    ));
+    text(&blocks)
+}
+
+/// Returns the counts, the recommended number of poses, and the expected errors of predictions.
+fn head<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
+    let (forecast, noun) = (&check.forecast, check.row_noun);
+    let of_poses = if noun == "pose" {
+        String::new()
+    } else {
+        format!(" in {}", counted(check.distinct_poses, "pose"))
+    };
+    let checked = counted(forecast.poses, noun);
+    let counts = format!("{}, {checked}{of_poses}", counted(forecast.expected.len(), "parameter"));
+    let mut blocks = opening(&problem.title, counts).to_vec();
+    blocks.push(Block::lines(recommendation(problem, check)));
+    blocks.push(Block::lines(prediction_sentences(check)));
+    blocks
+}
+
+/// States what the figures assume.
+fn assumptions_of<'a>(problem: &Problem, check: &Check) -> Option<Block<'a>> {
+    // If held-out rows are predicted, the checked poses are the fitted ones of a table.
+    let poses = (check.predicted_at != PredictionPoses::HeldOut).then_some(check.forecast.poses);
+    assumptions(problem, &check.forecast.expected, (poses, 0))
 }
 
 /// Draws the expected error of predictions against the number of poses.
@@ -213,18 +259,18 @@ fn recommendation(problem: &Problem, check: &Check) -> String {
         Some(enough) if enough <= check.forecast.poses => format!(
             "Enough: {enough} such poses determine every combination of parameters that such \
              poses can determine, and predictions are then as accurate as one measured position. \
-             More poses still lower the error (table below)."
+             More poses still lower the error."
         ),
         Some(enough) if let Some(measured) = poses_to_measure(problem, enough) => format!(
             "Measure {measured} poses, of which held_out removes {}: the others determine every \
              combination of parameters that such poses can determine, and predictions are then as \
-             accurate as one measured position. More poses still lower the error (table below).",
+             accurate as one measured position. More poses still lower the error.",
             measured - enough
         ),
         Some(enough) => format!(
             "Measure {enough} poses: they determine every combination of parameters that such \
              poses can determine, and predictions are then as accurate as one measured position. \
-             More poses still lower the error (table below)."
+             More poses still lower the error."
         ),
         None if check.noise.is_none() => {
             "No number of poses is recommended, because nothing measured is a length.".to_owned()

@@ -106,6 +106,54 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     blocks
 }
 
+/// Names the families of effects that the poses would show, and those that they would not, in a few
+/// lines.
+pub(super) fn brief<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<'a>> {
+    let (mut seen, mut hidden): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
+    for effect in &detection.effects {
+        // Poses that are still to be measured may get times.
+        let is_timed = detection.times_assumed && effect.effect.has_memory();
+        let is_seen = effect.sizes.iter().any(Size::is_within_prior) && !is_timed;
+        let names = if is_seen { &mut seen } else { &mut hidden };
+        if !names.contains(&effect.effect.name()) {
+            names.push(effect.effect.name());
+        }
+    }
+    for (effect, _) in &detection.untestable {
+        if !hidden.contains(&effect.name()) {
+            hidden.push(effect.name());
+        }
+    }
+    hidden.retain(|name| !seen.contains(name));
+    let listed =
+        |names: &[&str]| names.iter().map(|name| code(name)).collect::<Vec<_>>().join(", ");
+    let mut blocks = Vec::new();
+    if !seen.is_empty() {
+        let seen = listed(&seen);
+        blocks.push(Block::Text(format!("Effects that these poses would show: {seen}.")));
+    }
+    if !hidden.is_empty() {
+        let masses = if has_no_mass(problem) {
+            format!(
+                ". No mass is declared, so no load acts: give the links {} and {} in {}",
+                code("mass_kg"),
+                code("com_m"),
+                code("[[joint.body]]")
+            )
+        } else {
+            String::new()
+        };
+        let untimed = if detection.times_assumed {
+            format!(", or not without a column {}", code("time_s"))
+        } else {
+            String::new()
+        };
+        let hidden = listed(&hidden);
+        blocks.push(Block::Text(format!("Effects not shown{untimed}: {hidden}{masses}.")));
+    }
+    blocks
+}
+
 /// Returns the table rows of a family of effects, for at most [`MAX_SHOWN_EFFECTS`] places. Each
 /// place shows its effect that is hardest to detect; the hardest one comes first.
 fn hardest_rows(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {

@@ -420,6 +420,8 @@ fn parameters(rows: &[Row], free: &[String], has_camera: bool) -> String {
          \"camera*.c*\" = { free = true }\n\
          \"camera*.k*\" = { free = true }\n\
          \"camera*.p*\" = { free = true }\n\
+         # Of a lens that is calibrated already: { sigma_px = 1 } for f and c, { fixed = true } \
+         for k and p.\n\
          # Held are those that views of the board cannot tell from the ones above.\n"
     } else {
         "\"tool.*\" = { sigma_mm = 100.0 }                    # where the target sits on the tip\n\

@@ -18,8 +18,8 @@ type Key = (&'static str, Names, [Names; 2]);
 /// Units of angles and of lengths, with their other names in headers.
 const ANGLES: [Names; 2] = [&["deg", "degree", "degrees"], &["rad", "radian", "radians"]];
 const LENGTHS: [Names; 2] = [&["mm"], &["m"]];
-/// Keys of a joint that a table may have, with their other names and their units. "offset" is one of
-/// d where it is a length.
+/// Keys of a joint that a table may have, with their other names and their units. "offset" is one
+/// of d where it is a length.
 const KEYS: [Key; 5] = [
     ("theta", &["θ", "offset"], ANGLES),
     ("alpha", &["α", "twist"], ANGLES),
@@ -28,7 +28,12 @@ const KEYS: [Key; 5] = [
     ("theta", &["angle", "angulo", "winkel", "drehwinkel"], ANGLES),
 ];
 /// Keys of limits, whose units depend on the joint.
-const LIMITS: [(&str, [&str; 2]); 2] = [("min", ["min", "lower"]), ("max", ["max", "upper"])];
+const LIMITS: [(&str, Names); 2] = [
+    ("min", &["min", "lower", "minimum", "minimo", "최소", "最小"]),
+    ("max", &["max", "upper", "maximum", "maximo", "최대", "最大"]),
+];
+/// Largest length of a sheet that is asked about as one in metres, if no other is longer \[mm\].
+const MAX_ASKED_MM: f64 = 5.0;
 /// Words of a header that say nothing of its key.
 const FILLERS: [&str; 5] = ["i", "joint", "link", "limit", "limits"];
 /// Letters with accents, and those without in their place.
@@ -112,7 +117,7 @@ pub(crate) fn text_of_table(file: &Path) -> Result<SheetTable, InputError> {
         "dh = \"standard\"          # Rz(θ+q) Tz(d) Tx(a) Rx(α); the header alpha_i-1, a_i-1 takes the other form"
     };
     let mut out = format!("name = {}\n{form}\njoint = [\n", quoted(&name));
-    let mut lines = Vec::new();
+    let (mut lines, mut rows, mut longest) = (Vec::new(), Vec::new(), 0.0_f64);
     for record in reader.records() {
         let record = record.map_err(|error| bad(&error))?;
         let line = line(record.position());
@@ -124,7 +129,7 @@ pub(crate) fn text_of_table(file: &Path) -> Result<SheetTable, InputError> {
         if let Some(name) = record.get(0).filter(is_end) {
             return Err(place(line, None).error(UrdfErrorKind::SheetEnd { name: name.to_owned() }));
         }
-        let (mut entries, mut variable) = (Vec::new(), None);
+        let (mut entries, mut variable, mut row) = (Vec::new(), None, [0.0; 3]);
         for &Column { place: index, key, unit } in &columns {
             let cell = record.get(index).unwrap_or_default();
             let column = || place(line, header.get(index));
@@ -137,6 +142,16 @@ pub(crate) fn text_of_table(file: &Path) -> Result<SheetTable, InputError> {
                 if !is_one || !["theta", "d"].contains(&key) {
                     return Err(unreadable());
                 }
+            }
+            if ["a", "d"].contains(&key) {
+                longest = longest.max(value.abs() * if unit == "mm" { 1.0 } else { 1e3 });
+            }
+            if let Some(place) = ["a", "d", "alpha"].iter().position(|of| *of == key) {
+                row[place] = match unit {
+                    "deg" => value.to_radians(),
+                    "mm" => value * 1e-3,
+                    _ => value,
+                };
             }
             let is_limit = LIMITS.iter().any(|(limit, _)| *limit == key);
             if !cell.is_empty() && (value != 0.0 || is_limit) {
@@ -151,8 +166,42 @@ pub(crate) fn text_of_table(file: &Path) -> Result<SheetTable, InputError> {
         let entries: Vec<String> = entries.chain(slides).collect();
         let _ = writeln!(out, "  {{ {} }},", entries.join(", "));
         lines.push(line);
+        rows.push(row);
     }
-    Ok(SheetTable { text: out + "]\n", warnings, lines })
+    if longest > 0.0 && longest < MAX_ASKED_MM {
+        let kind = WarningKind::SheetInMetres { longest: longest.to_string() };
+        warnings.push(at(header_line, kind));
+    }
+    out.push_str("]\n");
+    out.push_str(&masses(&rows, is_modified(&header)));
+    Ok(SheetTable { text: out, warnings, lines })
+}
+
+/// Returns comments with a body for each link, of the rows a \[m\], d \[m\], α \[rad\], whose
+/// centre of mass lies in the middle of the link: between the frame of its row and the one before,
+/// or in the modified form the one behind.
+fn masses(rows: &[[f64; 3]], is_modified: bool) -> String {
+    let mut out = "# Masses, to look for what gives way under loads: put them into the rows, with \
+         true com_m.\n# The middle of each link, in metres in the frame behind the whole row, is \
+         about\n"
+        .to_owned();
+    let links = rows.get(usize::from(is_modified)..).unwrap_or_default();
+    for (number, [a, d, alpha]) in (1..).zip(links) {
+        let (sin, cos) = alpha.sin_cos();
+        let middle = if is_modified {
+            [a / 2.0, -d * sin / 2.0, d * cos / 2.0]
+        } else {
+            [-a / 2.0, -d * sin / 2.0, -d * cos / 2.0]
+        };
+        if middle.iter().any(|value| value.abs() > 1e-6) {
+            let [x, y, z] = middle.map(|value| (value * 1e4).round() / 1e4 + 0.0);
+            let _ = writeln!(
+                out,
+                "#   row {number}: body = [{{ mass_kg = ?, com_m = [{x}, {y}, {z}] }}]"
+            );
+        }
+    }
+    out
 }
 
 /// Returns true if the header says that α and a belong to the row before.
@@ -160,14 +209,15 @@ fn is_modified(header: &StringRecord) -> bool {
     header.iter().any(|name| OF_THE_ROW_BEFORE.iter().any(|mark| name.contains(mark)))
 }
 
-/// Returns the warning that names the columns that are not read. The first one is not named, because
-/// it numbers the joints or states their names.
+/// Returns the warning that names the columns that are not read. The first one is not named,
+/// because it numbers the joints or states their names.
 fn not_taken(header: &StringRecord, columns: &[Column]) -> Option<WarningKind> {
     let is_taken = |place: usize| columns.iter().any(|column| column.place == place);
     let named = header.iter().enumerate().skip(1);
     let named = named.filter(|(place, name)| !is_taken(*place) && !name.is_empty());
-    let names: Vec<String> = named.map(|(_, name)| name.to_owned()).collect();
-    let taken = columns.iter().map(|column| format!("{}_{}", column.key, column.unit)).collect();
+    let names: Vec<&str> = named.map(|(_, name)| name).collect();
+    let taken = columns.iter().map(|column| format!("{}_{}", column.key, column.unit));
+    let (names, taken) = (names.join(", "), taken.collect::<Vec<_>>().join(", "));
     (!names.is_empty()).then_some(WarningKind::SheetColumns { names, taken })
 }
 
@@ -220,7 +270,12 @@ fn columns(
             .ok_or_else(|| {
                 let write = first.2.map(|unit| format!("{}_{}", first.0, unit[0])).join(" or ");
                 at(name).error(if unit.is_some() || is_foreign {
-                    UrdfErrorKind::SheetOtherUnit { found: last.clone(), write }
+                    let quantity = if first.2 == ANGLES { Unit::Angle } else { Unit::Length };
+                    let factor = quantity.convert_foreign(last, 1.0);
+                    let symbol = quantity.in_tables().suffix;
+                    let factor = factor.map(|factor| format!(": 1 {last} is {factor} {symbol}"));
+                    let (found, factor) = (last.clone(), factor.unwrap_or_default());
+                    UrdfErrorKind::SheetOtherUnit { found, write, factor }
                 } else {
                     UrdfErrorKind::SheetUnit { write }
                 })
@@ -228,8 +283,13 @@ fn columns(
         columns.push(Column { place, key, unit });
     }
     let has = |key: &str| columns.iter().any(|column| column.key == key);
-    if !(has("alpha") && (has("a") || has("d"))) {
-        return Err(at("alpha").error(UrdfErrorKind::SheetWithoutParameters));
+    let lengths = ["a", "d"].into_iter().filter(|key| has(key)).count();
+    match (has("alpha"), lengths) {
+        (true, 1..) => {}
+        (false, 1..) if has("theta") || lengths == 2 => {
+            return Err(at("alpha").error(UrdfErrorKind::SheetWithoutAlpha));
+        }
+        _ => return Err(at("alpha").error(UrdfErrorKind::SheetWithoutParameters)),
     }
     let order = ["theta", "alpha", "d", "a", "min", "max"];
     columns.sort_by_key(|column| order.iter().position(|key| *key == column.key));

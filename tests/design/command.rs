@@ -141,8 +141,16 @@ fn a_check_takes_measured_poses_or_draws_them() {
     }
     assert_contains(
         &run.stdout,
-        &["32 parameters, 28 poses", "in the held-out poses", "joint1.beta + 0.71 joint2.theta"],
+        &[
+            "32 parameters, 28 poses",
+            "in the held-out poses",
+            "joint1.beta + 0.71 joint2.theta",
+            "parameters to 90 % or more",
+            "Effects that these poses would show: ",
+            "-v and check.html state",
+        ],
     );
+    assert!(run.stdout.split_whitespace().count() < 330, "{}", run.stdout);
     let drawn = "check tests/cases --truth tests/cases/truth.toml --poses 12 --json";
     let check = flexcal(&folder, drawn).success().json();
     assert_eq!(check["poses"], 12);
@@ -156,7 +164,7 @@ fn a_check_takes_measured_poses_or_draws_them() {
 #[test]
 fn a_check_names_what_would_be_found() {
     let folder = Folder::new();
-    let run = flexcal(&folder, "check tests/cases").success();
+    let run = flexcal(&folder, "check tests/cases -v").success();
     let detectable = &folder.json("check.json")["detectable"];
     assert_eq!((&detectable["power"], &detectable["level"]), (&json!(0.8), &json!(0.01)));
     let gear = |joint| {
@@ -191,7 +199,7 @@ fn a_check_names_what_would_be_found() {
 fn without_times_nothing_that_remembers_is_promised() {
     let measured = std::fs::read_to_string(path("tests/cases/a-none.csv")).unwrap();
     let (folder, table) = with_table("untimed.csv", &measured.replacen("time_s", "note", 1));
-    let run = flexcal(&folder, &format!("check tests/cases --data {table}")).success();
+    let run = flexcal(&folder, &format!("check tests/cases -v --data {table}")).success();
     assert_contains(&run.stdout, &["no column time_s, so the order of the poses is not known"]);
     let detectable = &folder.json("check.json")["detectable"];
     let has = |key: &str| texts(&detectable[key], "effect").contains(&"joint-hysteresis");
@@ -203,7 +211,7 @@ fn without_times_nothing_that_remembers_is_promised() {
     assert!(!run.stdout.contains("mm/h") && !run.stdout.contains("at_time_s"), "{run:?}");
     assert_eq!(detectable["times_assumed"], false);
     // Poses that are still to be measured may get measured times.
-    let later = "check tests/cases --truth tests/cases/truth.toml --poses 60";
+    let later = "check tests/cases -v --truth tests/cases/truth.toml --poses 60";
     let out = flexcal(&folder, later).success().stdout;
     let (table, rest) = out.split_once("These effects can be seen only").unwrap();
     assert!(rest.contains("joint-hysteresis") && !table.contains("joint-hysteresis"), "{out}");
@@ -431,7 +439,7 @@ fn a_plan_of_too_few_poses_says_how_many_it_takes() {
 #[test]
 fn what_the_nominal_arm_does_not_tell_is_not_said_to_be_identified() {
     let folder = Folder::new();
-    let out = flexcal(&folder, "check problems/ur10-urdf --poses 40").success().stdout;
+    let out = flexcal(&folder, "check problems/ur10-urdf --poses 40 -v").success().stdout;
     // joint5.theta and joint6.a are confounded if the target is at the origin of the last frame.
     assert_contains(&out, &["+ 0.71 joint5.theta + 0.71 joint6.a"]);
     let line = |name: &str| {

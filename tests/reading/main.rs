@@ -10,6 +10,7 @@ mod dialects;
 mod doubtful;
 mod exchange;
 mod files;
+mod first_hour;
 mod formats;
 mod joined;
 mod limits;

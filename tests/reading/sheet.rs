@@ -60,7 +60,12 @@ fn a_data_sheet_may_be_a_table_with_units_in_its_header() {
             "theta_deg,d_deg,alpha_deg",
             "column d_deg: deg is no unit of this column; write d_mm or d_m",
         ),
-        ("theta_deg,d [cm],alpha_deg", "column d [cm]: cm is no unit of this column"),
+        (
+            "theta_deg,d (in),alpha_deg",
+            "d (in): in is no unit of this column; write d_mm or d_m in the header, and convert \
+             the numbers: 1 in is 25.4 mm",
+        ),
+        ("theta_deg,d_mm,a_mm\n0,0.4,0", "column of the twist angle α; add alpha_deg"),
         (
             "θ [°],offset [deg],d_mm,alpha_deg\n9,0,0,0\n9,9,0,0",
             "another column states theta in this row",
@@ -98,13 +103,23 @@ fn a_data_sheet_may_have_accents_and_names_what_is_not_read() {
             "sheet.csv:1: columns not taken: x, y; taken: theta_deg",
         ),
         (
-            "i,theta offset [deg],link offset [mm],a mm,x,theta min °,theta max °,y,twist angle (deg)",
+            "i,theta offset [deg],link offset [mm],a mm,x,theta min °,theta max °,y,twist angle °",
             "sheet.csv:1: not UTF-8 text; read as Windows-1252",
         ),
     ] {
         assert_contains(&init(header), &[warning]);
         assert_contains(&folder.read("arm/problem.toml"), &[row]);
     }
+    // The middle of the second link is half the way back to the frame of the first.
+    assert_contains(
+        &folder.read("arm/problem.toml"),
+        &["#   row 2: body = [{ mass_kg = ?, com_m = [-0.0045, 0.225, 0] }]"],
+    );
+    let metres = "i,theta_deg,d_mm,a_mm,최소 (deg),최대 (deg),alpha_deg\n1,0,0.45,0.64,-9,9,-90\n";
+    std::fs::write(folder.path("metres.csv"), metres).unwrap();
+    let said = folder.flexcal("init metres.csv --out metres").success().stderr;
+    assert_contains(&said, &["metres.csv:1: no length is above 0.64 mm; if they are in metres"]);
+    assert_contains(&folder.read("metres/problem.toml"), &["min_deg = -9, max_deg = 9"]);
     let said = init("i,theta_rad,d_m,a_mm,x,min_deg,max_deg,y,alpha_rad");
     let asked = ["an angle of 14 turns; if it is in degrees, write theta_deg", "write alpha_deg"];
     assert_contains(&said, &asked.map(|words| words));
