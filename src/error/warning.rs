@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::near::did_you_mean;
-use super::phrases::{and_more, plural};
+use super::phrases::{and_more, image_remedy, plural};
 
 /// Kind of a warning, with its cause and remedy as message.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -69,11 +69,17 @@ pub enum WarningKind {
     )]
     PositionZero { write: String },
     #[error(
-        "{value} px is outside the image of the camera \"{camera}\", image_px = [{}, {}]; correct \
-         image_px, which plans and exports use{}",
-        image[0], image[1], more_rows(*rows)
+        "{value} px is outside the image of the camera \"{camera}\", image_px = [{}, {}]; {}, \
+         which plans and exports use{}",
+        image[0], image[1], image_remedy(image, *is_exchanged), more_rows(*rows)
     )]
-    OutsideImage { value: String, camera: String, image: [String; 2], rows: usize },
+    OutsideImage {
+        value: String,
+        camera: String,
+        image: [String; 2],
+        is_exchanged: bool,
+        rows: usize,
+    },
     #[error(
         "pixels of the camera \"{camera}\" reach {}, {}, but its centre_px is that of images of \
          {} × {} pixels: if its intrinsics were found at another resolution, multiply focal_px and \
@@ -332,9 +338,9 @@ pub enum WarningKind {
     )]
     TargetPerRow { rows: usize },
     #[error(
-        "[{}, {}] is far from the middle of image_px = [{}, {}], and near it if exchanged: write \
-         [{}, {}]",
-        centre[0], centre[1], image[0], image[1], centre[1], centre[0]
+        "[{}, {}] is far from the middle of image_px = [{}, {}], and near it if one of them is \
+         exchanged: write centre_px = [{}, {}], or image_px = [{}, {}] if that is width, height",
+        centre[0], centre[1], image[0], image[1], centre[1], centre[0], image[1], image[0]
     )]
     CentreExchanged { centre: [String; 2], image: [String; 2] },
     #[error(

@@ -88,6 +88,21 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
         && word.contains(['/', '*', '^', 'p'])
         && word.chars().all(|c| is_digit(c) || "+-*/^().piPI".contains(c));
     let mistake = |what: &str, remedy| Some((what.to_owned(), remedy));
+    let is_value = before.trim_end().ends_with(['=', '[', ',']);
+    let is_bare = is_value
+        && word.starts_with(char::is_alphabetic)
+        && !word.contains(['"', '\''])
+        && (message.contains("must be quoted") || message.starts_with("invalid"));
+    let is_rule = before.split('=').next().is_some_and(|key| key.contains(['.', '*']));
+    let last_word = before.rsplit(['{', ',']).next().unwrap_or_default().trim();
+    let is_colon = last_word.strip_suffix(':').is_some_and(|key| {
+        !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-\"".contains(c))
+    }) && !is_value;
+    let is_lone_flag = after.starts_with('}') && ["free", "fixed"].contains(&last_word);
+    let has_values_behind = after.trim_start().starts_with(',')
+        && before.contains('=')
+        && message.contains("expected newline")
+        && !before.trim_end().ends_with('=');
     let has_no_value = before.trim_end().ends_with('=')
         && after.split('#').next().is_some_and(|rest| rest.trim().is_empty());
     let is_spaced_list = before.contains('[')
@@ -145,6 +160,24 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
             "write its lines into the first section of this name"
         };
         mistake("the section is given twice", remedy)
+    } else if is_lone_flag || (is_rule && is_value && ["free", "fixed"].contains(&word)) {
+        mistake(
+            "a rule is a table in braces",
+            "write { free = true } to free parameters, { fixed = true } to hold them",
+        )
+    } else if is_bare {
+        mistake("text without quotes", "text stands in quotes, as in kind = \"fixed\"")
+    } else if has_values_behind {
+        mistake(
+            "several values or keys on one line",
+            "write a list in brackets, as in [\"a.csv\", \"b.csv\"], and each key on its own line",
+        )
+    } else if message.contains("invalid basic string") && message.contains("expected `\"`") {
+        mistake("a quote is opened and not closed", "write \" at the end of the text")
+    } else if is_colon {
+        mistake("a colon in place of =", "write key = value")
+    } else if message.contains("missing assignment") {
+        mistake("a key without =", "write key = value, as in { joint = 2 }")
     } else if message.contains("key with no value") && line_has_spaced_key(after) {
         mistake("a key with a space", "put the key in quotes, as in \"Joint 1\" = \"q1_deg\"")
     } else if message.contains("key with no value") {
@@ -199,6 +232,7 @@ fn single_brackets(
 /// Returns true if the first word of a key is followed by more words, and then by an equals sign.
 fn line_has_spaced_key(after: &str) -> bool {
     after.split_once('=').is_some_and(|(words, _)| {
-        !words.trim().is_empty() && words.chars().all(|c| c.is_alphanumeric() || c == ' ')
+        !words.trim().is_empty()
+            && words.chars().all(|c| c.is_alphanumeric() || " []()°/%.-".contains(c))
     })
 }
