@@ -14,6 +14,7 @@ otherwise (``x_mm``, ``mean_mm``, ``temperature_C``).
 from __future__ import annotations
 
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
 from ._applied import Compensation, Export
 from ._designs import Check, Next, Plan, Simulation, Study
@@ -52,3 +53,31 @@ __all__ = [
     "fleet",
     "study",
 ]
+
+
+OTHER_NAMES = {
+    "calibrate": "identify",
+    "fit": "identify",
+    "estimate": "identify",
+    "search": "loop",
+    "read": "Problem",
+    "load": "Problem",
+    "open": "Problem",
+}
+"""Names that are often taken for functions of this module, with what is meant."""
+
+
+# A type checker has to find what does not exist.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        meant = OTHER_NAMES.get(name, name)
+        if meant == "Problem":
+            hint = '; write flexcal.Problem("FOLDER")'
+        elif not name.startswith("_") and hasattr(Problem, meant):
+            hint = f"; it is a method of a problem: flexcal.Problem(\"FOLDER\").{meant}(…)"
+        elif not name.startswith("_") and hasattr(Identification, meant):
+            hint = f"; it belongs to an identified arm: flexcal.Problem(\"FOLDER\").identify().{meant}"
+        else:
+            hint = ""
+        raise AttributeError(f"module 'flexcal' has no attribute {name!r}{hint}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable, Sequence
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -145,6 +145,16 @@ class Problem(Forward):
         self._forward = core
         self._reader = core
         self._functions: dict[Strategy, LeastSquares] = {}
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            hint = ""
+            if name in ("calibrate", "fit", "estimate", "solve"):
+                hint = "; write identify()"
+            elif not name.startswith("_") and hasattr(Identification, name):
+                hint = f"; identify the arm first: problem.identify().{name}"
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
 
     @property
     def notes(self) -> list[str]:

@@ -209,6 +209,10 @@ def _columns(data: Any, argument: str = "data") -> Iterator[tuple[Any, Any]]:
         yield from _columns(pyarrow.table(data))
     else:
         kind = type(data).__name__
+        if isinstance(data, (list, tuple)) and data and all(hasattr(table, "columns") for table in data):
+            raise TypeError(
+                f"{argument}: one table is needed, not a {kind} of {len(data)}; join them: pandas.concat([…], ignore_index=True)"
+            )
         raise TypeError(
             f"{argument}: a path, a DataFrame or a dict of arrays is needed, not {kind}; for arrays with a row for each pose "
             'write {"q_deg": q, "xyz_mm": xyz}'

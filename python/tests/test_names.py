@@ -112,3 +112,32 @@ def test_a_missing_number_is_called_so(lunar: flexcal.Problem, identified: flexc
     # A type that may have gaps and has none is read to the last bit.
     whole = FRAME.assign(x_mm=FRAME["x_mm"].astype("Float64"))
     assert lunar.identify(whole).parameters.equals(identified.parameters)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("identify", 'flexcal.Problem("FOLDER").identify(…)'),
+        ("calibrate", 'flexcal.Problem("FOLDER").identify(…)'),
+        ("load", 'write flexcal.Problem("FOLDER")'),
+        ("compensate", 'flexcal.Problem("FOLDER").identify().compensate'),
+    ],
+)
+def test_functions_that_are_methods_are_named(name: str, words: str) -> None:
+    with pytest.raises(AttributeError) as caught:
+        getattr(flexcal, name)
+    assert words in str(caught.value)
+
+
+def test_results_of_a_problem_that_is_not_identified_are_named(lunar: flexcal.Problem) -> None:
+    for name in ("compensate", "watch", "export_urdf", "parameters"):
+        with pytest.raises(AttributeError, match=rf"problem\.identify\(\)\.{name}"):
+            getattr(lunar, name)
+    with pytest.raises(AttributeError, match="write identify"):
+        getattr(lunar, "fit")
+    assert not hasattr(lunar, "nothing") and not hasattr(flexcal, "__path_of_nothing__")
+    with pytest.raises(flexcal.InputError, match=r"write 0\.3 for 30 %"):
+        lunar.identify(FRAME, held_out=30)
+    with pytest.raises(TypeError, match=r"join them: pandas\.concat"):
+        tables: Any = [FRAME[:9], FRAME[9:]]
+        lunar.identify(tables)

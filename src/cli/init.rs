@@ -142,6 +142,18 @@ fn has_ending(file: &Path, endings: &[&str]) -> bool {
 
 /// Writes the chain of a URDF between two links as `problem.toml`, or completes a typed problem.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    if arguments.urdf.is_dir() {
+        let folder = arguments.urdf.display();
+        let held = if arguments.urdf.join("problem.toml").is_file() {
+            format!("{folder} holds a problem already, as flexcal identify takes it")
+        } else {
+            "not its folder".to_owned()
+        };
+        return Err(format!(
+            "{folder}: it is a folder; give the URDF of the arm or the table of its data sheet; {held}"
+        )
+        .into());
+    }
     if has_ending(&arguments.urdf, &["toml", "csv", "tsv", "txt"]) {
         return complete_sheet(arguments);
     }

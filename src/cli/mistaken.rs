@@ -117,6 +117,10 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
         let tip = "an argument is empty, as it is if a variable of the shell has no value";
         return Some(tip.to_owned());
     }
+    let value = context(ContextKind::InvalidValue).filter(|_| is_value(error.kind()));
+    if let Some(tip) = value.and_then(percentage) {
+        return Some(tip);
+    }
     match error.kind() {
         ErrorKind::InvalidSubcommand => {
             let path = Path::new(context(ContextKind::InvalidSubcommand)?);
@@ -158,7 +162,7 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
             elsewhere.map(|(_, tip)| (*tip).to_owned()).or_else(|| {
                 let other = || other_command(word, first, cli);
                 let table = || table_without_option(word, first);
-                let spaced = || unquoted(word, words);
+                let spaced = || valueless(word, words, cli).or_else(|| unquoted(word, words));
                 let second = || two_estimates(word, words).or_else(|| second_problem(word, words));
                 let found = long_dash(word).or_else(|| negative_number(words));
                 let found = found.or_else(other).or_else(table).or_else(spaced).or_else(second);
@@ -175,6 +179,27 @@ fn inner_command(word: &str, cli: &Command) -> Option<String> {
     Some(format!("flexcal {} {word} may be meant", outer.get_name()))
 }
 
+/// Returns the tip for a value in percent; `None` for other values.
+fn percentage(value: &str) -> Option<String> {
+    let percent: f64 = value.strip_suffix('%')?.trim().parse().ok()?;
+    let fraction: f64 = format!("{:.11e}", percent / 100.0).parse().ok()?;
+    Some(format!("write {fraction} for {value}"))
+}
+
+/// Returns the tip for a word behind an option that takes no value; `None` for other words.
+fn valueless(word: &str, words: &[OsString], cli: &Command) -> Option<String> {
+    let place = words.iter().position(|other| other == word)?;
+    let option = words.get(place.checked_sub(1)?)?.to_str()?;
+    let command = cli.find_subcommand(words.get(1)?)?;
+    let is_it = |argument: &&clap::Arg| {
+        argument.get_long().is_some_and(|long| option == format!("--{long}"))
+            || argument.get_short().is_some_and(|short| option == format!("-{short}"))
+    };
+    let argument = command.get_arguments().find(is_it)?;
+    (!argument.get_action().takes_values())
+        .then(|| format!("{option} takes no value: leave {word} out"))
+}
+
 /// Returns the tip for a second word of a value; `None` if no word precedes it that follows an
 /// option.
 fn unquoted(word: &str, words: &[OsString]) -> Option<String> {
@@ -182,6 +207,15 @@ fn unquoted(word: &str, words: &[OsString]) -> Option<String> {
     let place = words.iter().position(|other| *other == word)?;
     let [option, first] = words.get(place.checked_sub(2)?..place)? else { return None };
     let is_option = option.starts_with("--") && !option.contains('=') && !first.starts_with('-');
+    let is_number = |word: &&&str| word.trim_end_matches(',').parse::<f64>().is_ok();
+    let numbers = words.iter().skip(place - 1).take_while(is_number);
+    let numbers: Vec<&str> = numbers.map(|word| word.trim_end_matches(',')).collect();
+    if is_option && numbers.len() > 1 {
+        return Some(format!(
+            "several numbers have commas and no spaces: {option}={}",
+            numbers.join(",")
+        ));
+    }
     (is_option && !word.starts_with('-'))
         .then(|| format!("a value with a space needs quotes: {option} \"{first} {word}\""))
 }
@@ -258,7 +292,13 @@ fn other_command(option: &str, command: &str, cli: &Command) -> Option<String> {
     }
     let fits = FITTING.contains(&command) && option == "--estimate";
     let instead = if fits { ", because it fits by itself" } else { "" };
-    Some(format!("{command} takes no {option}{instead}; it is an option of {}", others.join(", ")))
+    let seed = if option == "--seed" && FITTING.contains(&command) {
+        "; the problem says which rows are held out: held_out = { fraction = 0.3, seed = 1 } in [data]"
+    } else {
+        ""
+    };
+    let others = others.join(", ");
+    Some(format!("{command} takes no {option}{instead}; it is an option of {others}{seed}"))
 }
 
 /// Commands that fit the measurements and so need no estimate.

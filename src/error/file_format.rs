@@ -9,9 +9,14 @@ pub(crate) const TOML: &str = "a TOML file";
 /// Name of the format of URDFs in messages.
 pub(crate) const XML: &str = "an XML file";
 
+/// Name of archives and workbooks in messages.
+pub(super) const ZIP: &str = "a ZIP archive or a workbook (XLSX, ODS)";
+/// Name of the format of word processors in messages.
+pub(super) const RICH_TEXT: &str = "rich text (RTF)";
+
 /// Formats of binary files by their first bytes.
 const BINARY_SIGNATURES: [(&[u8], &str); 18] = [
-    (b"PK\x03\x04", "a ZIP archive or a workbook (XLSX, ODS)"),
+    (b"PK\x03\x04", ZIP),
     (b"\xd0\xcf\x11\xe0", "a workbook or document of old Office programs (XLS, DOC)"),
     (b"%PDF", "a PDF document"),
     (b"\x1f\x8b", "a file compressed by gzip"),
@@ -32,7 +37,7 @@ const BINARY_SIGNATURES: [(&[u8], &str); 18] = [
 ];
 
 /// Formats of text files by their first characters, in lower case.
-const TEXT_MARKS: [(&str, &str); 9] = [
+const TEXT_MARKS: [(&str, &str); 10] = [
     ("<!doctype html", "an HTML page"),
     ("<html", "an HTML page"),
     ("<", XML),
@@ -40,6 +45,7 @@ const TEXT_MARKS: [(&str, &str); 9] = [
     ("solid ", "a mesh (STL)"),
     ("iso-10303-21", "a STEP file"),
     ("%yaml", YAML),
+    ("{\\rtf", RICH_TEXT),
     ("{", JSON),
     ("---\n", YAML),
 ];
@@ -110,6 +116,7 @@ mod tests {
         for (text, format) in [
             ("\u{feff}\n<!DOCTYPE HTML>", Some("an HTML page")),
             ("<?xml version='1.0'?>", Some(XML)),
+            ("{\\rtf1\\ansi", Some(RICH_TEXT)),
             ("{\n \"a\": 1}", Some(JSON)),
             ("[ {\"q1\": 1}]", Some(JSON)),
             ("[\n {\n \"q1\": 1}]", Some(JSON)),

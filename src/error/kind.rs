@@ -6,10 +6,12 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::NoRows;
-use super::near::{is_it_rather, key_suggestion, name_suggestion, pattern_suggestion, suggestion};
+use super::near::{
+    is_it_rather, key_suggestion, known_words, name_suggestion, pattern_suggestion, suggestion,
+};
 use super::phrases::{
-    behind_camera_remedy, decimal_comma_hint, joined_list, missed, near_quote, path_hint, plural,
-    renumbered, stiffness_units, with_remedy,
+    behind_camera_remedy, decimal_comma_hint, fixtures_of, format_remedy, held_out_example,
+    joined_list, missed, near_quote, path_hint, plural, renumbered, stiffness_units, with_remedy,
 };
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
@@ -24,20 +26,16 @@ use super::urdf::UrdfErrorKind;
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum InputErrorKind {
     // The following errors concern files.
-    #[error("no such file; give a problem.toml or the folder that holds one")]
-    ProblemMissing,
-    #[error("no such file; the folder holds the results of a loop: give {}", closed.display())]
-    FolderOfResults { closed: PathBuf },
+    #[error("no such file; {remedy}")]
+    ProblemMissing { remedy: String },
     #[error(
-        "no such file; give the TRUTH.toml that describes the simulation, or the folder that \
-         holds one"
+        "no such file; give the TRUTH.toml that describes the simulation and that you write \
+         (docs/truth.md), or its folder"
     )]
     TruthMissing,
     #[error(
-        "no such file: {}; paths in `files` are relative to the problem's folder{}; before \
-         anything is measured, flexcal plan chooses poses",
-        path.display(),
-        path_hint(path)
+        "no such file: {}; paths in `files` are relative to the problem's folder{}",
+        path.display(), path_hint(path)
     )]
     DataFileMissing { path: PathBuf },
     #[error("no such file; paths on the command line are relative to the current folder")]
@@ -56,14 +54,17 @@ pub enum InputErrorKind {
     HeaderNotUtf8,
     #[error("UTF-16 text, by its byte-order mark; save the file as UTF-8")]
     Utf16,
-    #[error("{found}, not {expected}")]
+    #[error("{found}, not {expected}{}", format_remedy(found, expected))]
     OtherFormat { found: &'static str, expected: &'static str },
     #[error("not valid TOML: {message}{}{}", near_quote(near_text), with_remedy(*remedy))]
     Syntax { message: String, near_text: String, remedy: Option<&'static str> },
 
     // The following errors concern keys.
-    #[error("unknown key{}; known here: {}", key_suggestion(key, known), known.join(", "))]
-    UnknownKey { key: String, known: Vec<String> },
+    #[error(
+        "unknown key{}; known here: {}",
+        key_suggestion(key, meant.as_deref(), known), known.join(", ")
+    )]
+    UnknownKey { key: String, meant: Option<String>, known: Vec<String> },
     #[error("does not belong here: {place}")]
     MisplacedKey { place: String },
     #[error("missing; write {write}{}", is_it_rather("", near.as_deref()))]
@@ -78,7 +79,7 @@ pub enum InputErrorKind {
     WrongUnit { noun: &'static str, suffix: String, write: String },
     #[error("given already as {first}; keep one of the two")]
     GivenTwice { first: String },
-    #[error("\"{word}\" is none of {}", known.join(", "))]
+    #[error("\"{word}\" is none of {}", known_words(word, known))]
     UnknownWord { word: String, known: &'static [&'static str] },
 
     // The following errors concern values.
@@ -201,7 +202,7 @@ pub enum InputErrorKind {
     #[error(
         "no {what} is called \"{name}\"{}; {}",
         suggestion(name, known),
-        joined_list("there are", known, &format!("none is declared by a section [[{what}]]"))
+        fixtures_of(what, known)
     )]
     UnknownFixture { what: &'static str, name: String, known: Vec<String> },
     #[error(
@@ -413,7 +414,8 @@ pub enum InputErrorKind {
     NothingConstrained,
 
     #[error(
-        "the nominal arm has no equilibrium under its loads here; check stiffnesses and masses"
+        "the nominal arm has no equilibrium under its loads here; check gravity, stiffnesses and \
+         masses"
     )]
     NoEquilibrium,
     #[error(
@@ -459,10 +461,11 @@ pub enum InputErrorKind {
 
     // The following errors concern held-out rows.
     #[error(
-        "give one of column, fraction (with seed) or session, as in held_out = {{ fraction = 0.3, \
-         seed = 1 }}, or held_out = \"none\" to fit all rows"
+        "give one of column, fraction (with seed) or session, as in held_out = {}, or held_out = \
+         \"none\" to fit all rows",
+        held_out_example(word.as_deref())
     )]
-    NotOneHeldOut,
+    NotOneHeldOut { word: Option<String> },
     #[error(
         "no held-out rows are declared; write held_out = {{ fraction = 0.3, seed = 1 }} in \
          [data], or add a column split"

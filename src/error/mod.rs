@@ -6,6 +6,7 @@ mod file_format;
 mod kind;
 mod near;
 mod no_rows;
+mod other_names;
 mod phrases;
 mod plain;
 mod remedy;
@@ -25,6 +26,7 @@ pub(crate) use file_format::{JSON, TABLE, TOML, XML, binary_format, text_format}
 pub use kind::InputErrorKind;
 pub(crate) use near::{nearest, one_typo};
 pub(crate) use no_rows::NoRows;
+pub(crate) use other_names::other_names;
 pub(crate) use plain::typographic;
 pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
 pub(crate) use study::StudyErrorKind;

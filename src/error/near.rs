@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use strsim::{damerau_levenshtein, normalized_damerau_levenshtein};
 
+use super::other_names::{other_names, other_word};
+
 /// Minimum similarity of a suggested word: 1 for the same word, 0 for no common letter.
 const MIN_SIMILARITY: f64 = 0.6;
 
@@ -52,9 +54,13 @@ pub(super) fn suggestion<T: AsRef<str>>(word: &str, known: impl IntoIterator<Ite
     did_you_mean(nearest(word, known).as_ref().map(AsRef::as_ref))
 }
 
-/// Returns the suggestion for an unknown key: a unit if several known keys differ from it by their
-/// unit alone, otherwise a similar key, or those that a first word is missing to.
-pub(super) fn key_suggestion(key: &str, known: &[String]) -> String {
+/// Returns the suggestion for an unknown key: what is `meant` with its value, if that is known; a
+/// unit if several known keys differ from it by their unit alone; otherwise the keys that it is
+/// another name of, a similar key, or those that a first word is missing to.
+pub(super) fn key_suggestion(key: &str, meant: Option<&str>, known: &[String]) -> String {
+    if meant.is_some() {
+        return did_you_mean(meant);
+    }
     let is_with_unit =
         |name: &&String| name.strip_prefix(key).is_some_and(|end| end.starts_with('_'));
     if known.iter().filter(is_with_unit).count() > 1 {
@@ -62,6 +68,17 @@ pub(super) fn key_suggestion(key: &str, known: &[String]) -> String {
     }
     if key.starts_with("EI_") && known.iter().any(|name| name == "EIy_N_m2") {
         return " (did you mean EIy_N_m2 and EIz_N_m2, equal for a round tube?)".to_owned();
+    }
+    let others = other_names(key, known);
+    if let [_, ..] = others.as_slice() {
+        let note = if key.to_lowercase().starts_with("quat") {
+            " quaternions are not read here"
+        } else {
+            ""
+        };
+        let joiner =
+            if others.len() == 2 && others[0].starts_with("min") { " and " } else { " or " };
+        return format!(" (did you mean {}?{note})", others.join(joiner));
     }
     let near = suggestion(key, known);
     if !near.is_empty() {
@@ -93,6 +110,11 @@ pub(super) fn pattern_suggestion(pattern: &str, known: &[String]) -> String {
     if known.iter().any(|name| name.strip_prefix(pattern).is_some_and(|end| end.starts_with('.'))) {
         return format!(" (did you mean \"{pattern}.*\"?)");
     }
+    if pattern.starts_with("tool.r") {
+        return " (the tool has rotations where orientations are fitted: write \
+                orientation_sigma_deg in [data], and measure rx_deg, ry_deg and rz_deg)"
+            .to_owned();
+    }
     if let Some(joint) = pattern.strip_suffix(".stiffness")
         && known.iter().any(|name| *name == format!("{joint}.alpha"))
     {
@@ -107,12 +129,25 @@ pub(super) fn pattern_suggestion(pattern: &str, known: &[String]) -> String {
     {
         return format!(" (nothing here has a name in brackets: \"{head}{rest}\")");
     }
-    match pattern.strip_suffix(".*") {
-        Some(head) => {
-            let heads = known.iter().filter_map(|name| Some(name.rsplit_once('.')?.0));
-            did_you_mean(nearest(head, heads).map(|head| format!("\"{head}.*\"")).as_deref())
-        }
-        None => suggestion(pattern, known),
+    if let Some(head) = pattern.strip_suffix(".*") {
+        let heads = known.iter().filter_map(|name| Some(name.rsplit_once('.')?.0));
+        return did_you_mean(nearest(head, heads).map(|head| format!("\"{head}.*\"")).as_deref());
+    }
+    let Some((part, name)) = pattern.rsplit_once('.') else { return suggestion(pattern, known) };
+    let names: Vec<String> = known
+        .iter()
+        .filter_map(|known| known.strip_prefix(part)?.strip_prefix('.').map(str::to_owned))
+        .collect();
+    if names.is_empty() || name.contains('*') {
+        return suggestion(pattern, known);
+    }
+    let meant = other_names(name, &names)
+        .first()
+        .copied()
+        .or_else(|| nearest(name, &names).map(String::as_str));
+    match meant {
+        Some(meant) => format!(" (did you mean {part}.{meant}?)"),
+        None => format!(" ({part} has {})", names.join(", ")),
     }
 }
 
@@ -122,6 +157,17 @@ pub(super) fn name_suggestion(name: &str, known: &[String]) -> String {
         return " (no patterns here: write each name in full)".to_owned();
     }
     suggestion(name, known)
+}
+
+/// Returns the `known` words of a key, and the one that another `word` means or is like. Signs
+/// stand in quotes.
+pub(super) fn known_words(word: &str, known: &[&str]) -> String {
+    let are_signs = known.iter().any(|word| !word.starts_with(char::is_alphanumeric));
+    let quoted = |word: &str| if are_signs { format!("{word:?}") } else { word.to_owned() };
+    let listed: Vec<String> = known.iter().map(|word| quoted(word)).collect();
+    let meant = other_word(word, known).or_else(|| nearest(word, known).copied());
+    let meant = meant.map_or_else(String::new, |meant| format!("; write {meant:?}"));
+    format!("{}{meant}", listed.join(", "))
 }
 
 /// Returns ` (is it …?)` with a similar word and its noun; an empty text for `None`.

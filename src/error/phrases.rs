@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use super::file_format::{JSON, RICH_TEXT, ZIP};
+use super::near::file_like;
 use super::shortened;
 
 /// Returns the plural ending `s` unless `count` is 1.
@@ -24,8 +26,8 @@ pub(super) fn with_remedy(remedy: Option<&str>) -> String {
     remedy.map_or_else(String::new, |remedy| format!("; {remedy}"))
 }
 
-/// Returns the hint that a path is a pattern, an address, or an absolute one of Windows; otherwise
-/// an empty text.
+/// Returns the hint that a path is a pattern, an address, or an absolute one of Windows; otherwise,
+/// unless a file has a similar name, that poses can be planned.
 pub(super) fn path_hint(path: &Path) -> &'static str {
     let text = path.to_string_lossy();
     if text.contains(['*', '?']) {
@@ -43,6 +45,8 @@ pub(super) fn path_hint(path: &Path) -> &'static str {
     });
     if has_drive && cfg!(not(windows)) {
         "; an absolute path of Windows names no file on this system"
+    } else if file_like(path).is_none() {
+        "; before anything is measured, flexcal plan chooses poses"
     } else {
         ""
     }
@@ -264,5 +268,46 @@ pub(super) fn covariate_hint(meant: Option<&str>, is_angle: bool) -> &'static st
              [data.covariates])"
         }
         (None, false) => " (name it in [data.covariates] if the arm may depend on it)",
+    }
+}
+
+/// Returns the remedy for a file of the format `found` where a file of another one is `expected`.
+pub(super) fn format_remedy(found: &str, expected: &str) -> &'static str {
+    match found {
+        RICH_TEXT => "; save the file as plain text in UTF-8",
+        JSON if expected.starts_with("a table") => "; an estimate.json follows --estimate",
+        ZIP if expected.contains("problem.toml") => "; unpack an archive and give its folder",
+        _ => "",
+    }
+}
+
+/// Returns the value of `held_out` for its text `word`, which may be the name of a column or of a
+/// session.
+pub(super) fn held_out_example(word: Option<&str>) -> String {
+    word.map_or_else(
+        || "{ fraction = 0.3, seed = 1 }".to_owned(),
+        |word| {
+            format!(
+                "{{ column = \"{word}\" }} if a column of this name marks the rows, {{ session = \
+                 \"{word}\" }} if a session is called so, or {{ fraction = 0.3, seed = 1 }}"
+            )
+        },
+    )
+}
+
+/// States which fixtures of a kind there are, and how another one is declared.
+pub(super) fn fixtures_of(what: &str, known: &[String]) -> String {
+    if known.is_empty() {
+        return format!("none is declared by a section [[{what}]]");
+    }
+    format!("there are {}; a section [[{what}]] declares another one", known.join(", "))
+}
+
+/// Returns what to do with the declared size of images that has its numbers exchanged, or is wrong.
+pub(super) fn image_remedy(image: &[String; 2], is_exchanged: bool) -> String {
+    if is_exchanged {
+        format!("the pixels fit image_px = [{}, {}]: write that", image[1], image[0])
+    } else {
+        "correct image_px".to_owned()
     }
 }

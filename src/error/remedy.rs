@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::near::nearest;
-use super::{InputError, InputErrorKind, Location, one_line};
+use super::{InputError, InputErrorKind, Location, TableErrorKind, one_line};
 
 impl fmt::Display for InputError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -37,7 +37,16 @@ fn remedy(location: &Location, kind: &InputErrorKind) -> &'static str {
         InputErrorKind::WrongType { found: "a list", .. } if name.contains("_sigma") => {
             "; one σ holds for all axes, and a column sigma_mm states one for each row"
         }
-        InputErrorKind::UnknownKey { key, known }
+        InputErrorKind::NotAFraction { value } if section == "data" && *value == 0.0 => {
+            "; held_out = \"none\" fits all rows"
+        }
+        InputErrorKind::Table(TableErrorKind::MissingColumn { write, .. }) if write == "point" => {
+            "; it holds the number of the marker's point, counted from 0"
+        }
+        InputErrorKind::NotFinite { .. } if name.starts_with("stiffness") => {
+            "; for a rigid part leave the key out"
+        }
+        InputErrorKind::UnknownKey { key, known, .. }
             if section == "effect"
                 && !location.key.as_deref().is_some_and(|path| path.contains("].law"))
                 && !ARGUMENTS.contains(&key.as_str())

@@ -25,8 +25,11 @@ pub enum TableErrorKind {
     NoDataFiles,
     #[error("{} is named twice; its rows would count twice", path.display())]
     RepeatedFile { path: PathBuf },
-    #[error("several joints are called \"{name}\"; write {}", write.join(" and "))]
-    SharedJointName { name: String, write: Vec<String> },
+    #[error(
+        "several joints are called \"{name}\" ({}); give each its own name, or write {}",
+        places.join(", "), write.join(" and ")
+    )]
+    SharedJointName { name: String, places: Vec<String>, write: Vec<String> },
     #[error("named twice on the command line; its rows would count twice")]
     GivenFileRepeated,
     #[error("the file is empty; it begins with a header line such as q1_deg,x_mm,y_mm,z_mm")]

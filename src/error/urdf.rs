@@ -69,7 +69,7 @@ pub enum UrdfErrorKind {
     Truncated { element: String },
     #[error("a mass of {text} kg is negative")]
     NegativeMass { text: String },
-    #[error("the axis has no direction")]
+    #[error("the axis has no direction; write one, such as xyz=\"0 0 1\"")]
     NoAxis,
     #[error(
         "a joint of type \"{kind}\" is not supported{}; supported types: revolute, continuous, \
@@ -170,6 +170,9 @@ fn conversion(found: &str) -> &'static str {
              mjcf-urdf-simple-converter"
         }
         "sdf" => "; an SDFormat model (SDF): convert it first, for example with sdf2urdf of pysdf",
+        "launch" => {
+            "; a launch file: give the URDF that it names (a xacro has to be expanded first)"
+        }
         "COLLADA" => "; a mesh (COLLADA): give the URDF that refers to it",
         _ => "",
     }

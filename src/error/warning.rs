@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::near::did_you_mean;
 use super::phrases::{
-    additional_rows, and_more, covariate_hint, further_rows, plural, repeated_rows,
+    additional_rows, and_more, covariate_hint, further_rows, image_remedy, plural, repeated_rows,
 };
 
 /// Kind of a warning, with its cause and remedy as message.
@@ -77,11 +77,17 @@ pub enum WarningKind {
     )]
     BeyondReach { value: String, far: String, hint: &'static str, rows: usize },
     #[error(
-        "{value} px is outside the image of the camera \"{camera}\", image_px = [{}, {}]; correct \
-         image_px, which plans and exports use{}",
-        image[0], image[1], more_rows(*rows)
+        "{value} px is outside the image of the camera \"{camera}\", image_px = [{}, {}]; {}, \
+         which plans and exports use{}",
+        image[0], image[1], image_remedy(image, *is_exchanged), more_rows(*rows)
     )]
-    OutsideImage { value: String, camera: String, image: [String; 2], rows: usize },
+    OutsideImage {
+        value: String,
+        camera: String,
+        image: [String; 2],
+        is_exchanged: bool,
+        rows: usize,
+    },
     #[error(
         "pixels of the camera \"{camera}\" reach {}, {}, but its centre_px is that of images of \
          {} × {} pixels: if its intrinsics were found at another resolution, multiply focal_px and \
@@ -343,9 +349,9 @@ pub enum WarningKind {
     )]
     TargetPerRow { rows: usize },
     #[error(
-        "[{}, {}] is far from the middle of image_px = [{}, {}], and near it if exchanged: write \
-         [{}, {}]",
-        centre[0], centre[1], image[0], image[1], centre[1], centre[0]
+        "[{}, {}] is far from the middle of image_px = [{}, {}], and near it if one of them is \
+         exchanged: write centre_px = [{}, {}], or image_px = [{}, {}] if that is width, height",
+        centre[0], centre[1], image[0], image[1], centre[1], centre[0], image[1], image[0]
     )]
     CentreExchanged { centre: [String; 2], image: [String; 2] },
     #[error(

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
+use super::guessed_names::shared_name;
 use super::headerless::{holds_numbers, no_header};
 use super::mapped::{Names, no_such};
 use super::meaning::{
@@ -15,7 +16,7 @@ use crate::error::{
     InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind, nearest, one_typo,
 };
 use crate::observation::{Kind, kinds};
-use crate::problem::{ColumnRule, HeldOut, JointSource, Problem};
+use crate::problem::{ColumnRule, HeldOut, Joint, JointSource, Problem};
 use crate::quantity::Unit;
 
 /// Maximum number of unknown columns for which a warning suggests a similar name.
@@ -152,7 +153,11 @@ impl Columns {
                         let kind = TableErrorKind::MistypedColumn { meant: meant.clone() };
                         mistyped.get_or_insert_with(|| error(kind.into()));
                     }
-                    let is_angle = name.ends_with("_joint_deg") || name.ends_with("_joint_rad");
+                    let is_read = |column: &Column| {
+                        column.place + 1 == place && matches!(column.role, Role::Joint(_))
+                    };
+                    let is_angle = (name.ends_with("_deg") || name.ends_with("_rad"))
+                        && (name.contains("_joint_") || columns.read.iter().any(is_read));
                     let kind = WarningKind::ColumnIgnored { meant, is_angle };
                     warnings.push(Warning { location: table.column(name), kind });
                 }
@@ -251,22 +256,11 @@ impl Columns {
                 {
                     return Err(table.column(zero).error(TableErrorKind::JointsFromZero));
                 }
-                let namesakes = || {
-                    problem.joints.iter().enumerate().filter(|(_, other)| other.name == joint.name)
-                };
-                let is_shared = namesakes().nth(1).is_some();
-                let of_it = |name: &&&str| {
-                    name.strip_prefix(&joint.name).is_some_and(|rest| rest.starts_with('_'))
-                };
-                if let Some(column) = unknown.iter().find(of_it).filter(|_| is_shared) {
-                    let write = namesakes().map(|(index, _)| {
-                        unit.alternatives(&format!("q{}{suffix}", numbering.number(index)))
-                    });
-                    let (name, write) = (joint.name.clone(), write.collect());
-                    return Err(table
-                        .column(column)
-                        .error(TableErrorKind::SharedJointName { name, write }));
+                if let Some(error) = shared_name(index, (table, problem, numbering), unknown) {
+                    return Err(error);
                 }
+                let is_namesake = |other: &&Joint| other.name == joint.name;
+                let is_shared = problem.joints.iter().filter(is_namesake).nth(1).is_some();
                 let has_joint = |role: &Role| matches!(role, Role::Joint(_) | Role::Reading(_));
                 if measured
                     && unknown.is_empty()

@@ -88,10 +88,22 @@ impl Layout {
         let first_unmarked = || candidates.iter().copied().find(|(_, line)| !is_marked(line));
         let has_known =
             || candidates.iter().copied().find(|(_, line)| has_names(line) && !is_marked(line));
+        // Without known names, as many words as the first row has numbers are its header.
+        let selects_places =
+            dialect.columns.iter().any(|rule| !matches!(rule.theirs, ColumnSelector::Name(_)));
+        let stands_above_numbers = |names: &str| {
+            let names = cells(names, delimiter_of(names));
+            let Some((_, row)) = first_unmarked().filter(|_| !selects_places) else { return false };
+            let row = cells(row, delimiter_of(row));
+            let numbers = row.iter().filter(|cell| parsed(cell).is_some()).count();
+            let are_words = names.iter().all(|name| parsed(name).is_none());
+            names.len() > 2 && names.len() == row.len() && are_words && 2 * numbers > row.len()
+        };
         // Returns the bytes of the mark in front of the names of a line.
         let mark_before_names = |line: &str| {
             let mark_bytes = mark_bytes(line, dialect.comment.as_deref())?;
-            has_names(line.get(mark_bytes..)?).then_some(mark_bytes)
+            let names = line.get(mark_bytes..)?;
+            (has_names(names) || stands_above_numbers(names)).then_some(mark_bytes)
         };
         let marked = || lines.iter().copied().find(|(_, line)| mark_before_names(line).is_some());
         // If there are rows between a marked header and a later line of names, the marked line is

@@ -201,7 +201,16 @@ impl Measurements {
         };
         let mut found = (0..self.len()).filter_map(outside);
         let (row, column, value, camera) = found.next()?;
+        let fits_exchanged = |row: usize| {
+            let Observation::Pixel(other, ..) = self.observation(row) else { return true };
+            let is_other =
+                problem.fixtures.get(other as usize).is_none_or(|of| of.name != camera.name);
+            let [width, height] = camera.image.unwrap_or_default();
+            let pixel = self.positions.get(row).copied().unwrap_or_default();
+            is_other || (pixel.x <= height - 0.5 && pixel.y <= width - 0.5)
+        };
         let kind = WarningKind::OutsideImage {
+            is_exchanged: (0..self.len()).all(fits_exchanged),
             value: format!("{value:.1}"),
             camera: camera.name.clone(),
             image: camera.image?.map(|size| size.to_string()),

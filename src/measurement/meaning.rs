@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::convert::identity;
 
+use super::foreign_name::guess;
 use super::join_key::TIME_UNITS;
 use super::role::{POINT, Role, columns_with_unit, columns_without_unit};
 use crate::error::{InputError, InputErrorKind, TableErrorKind, WarningKind, nearest};
@@ -64,6 +65,9 @@ impl Numbering {
     /// Returns the column name that an unknown name probably means, among those that the table
     /// lacks; `None` if none is similar.
     pub fn meant(&self, name: &str, present: &BTreeSet<&str>, problem: &Problem) -> Option<String> {
+        if let Some(meant) = self.guessed(name, problem) {
+            return Some(meant).filter(|meant| !present.contains(split_unit(meant).0));
+        }
         let moving = || {
             problem
                 .joints
@@ -85,6 +89,18 @@ impl Numbering {
             .flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
         let lacking = |name: &String| !present.contains(split_unit(name).0);
         nearest(name, plain.chain(approach).chain(measured).filter(lacking))
+    }
+
+    /// Returns the column of a joint or coordinate that a name of another program means, such as
+    /// `q1_deg` for `joint1_deg`; `None` for other names.
+    fn guessed(&self, name: &str, problem: &Problem) -> Option<String> {
+        let (base, written) = guess(name).filter(|(base, _)| base != name)?;
+        let unit = match numbered(&base, "q") {
+            Some(number) => unit_of(problem.joints.get(self.joint(number)?)?.command_kind())?,
+            None => Unit::Length,
+        };
+        let written = written.filter(|written| unit.suffix(written).is_some());
+        Some(format!("{base}_{}", written.unwrap_or(unit.in_tables().suffix)))
     }
 
     /// Returns the meaning of a column with the velocity of a joint, such as `qd1_deg_per_s`; `None` for

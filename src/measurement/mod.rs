@@ -25,6 +25,7 @@ mod doubtful_rows;
 #[deny(clippy::indexing_slicing)]
 mod duplicates;
 #[deny(clippy::indexing_slicing)]
+mod foreign_name;
 mod guessed_names;
 mod headerless;
 mod instants;

@@ -1,6 +1,7 @@
 //! Arguments of effects, read and checked against the arm.
 
 use super::section::Section;
+use super::wrong_type::several_joints;
 use super::{Body, Joint, JointKind, Problem, beam_names};
 use crate::error::{InputError, InputErrorKind};
 use crate::laws::{Argument, ArgumentKind, quoted};
@@ -63,12 +64,32 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
     }
 
     fn read_any_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        if let Some(error) = self.joint_meant(key) {
+            return Err(error);
+        }
         let item = self.section.require(key, &format!("{key} = …, a joint's number"))?;
         let joint = item.whole(0)?;
         match usize::try_from(joint) {
             Ok(number) if (1..=self.joints.len()).contains(&number) => Ok(number),
             _ => Err(item.error(InputErrorKind::UnknownJoint { joint, joints: self.joints.len() })),
         }
+    }
+
+    /// Returns the error of an effect without `key` that names several joints, or a beam; `None` for
+    /// other effects.
+    fn joint_meant(&self, key: &str) -> Option<InputError> {
+        let peek = |key: &str| self.section.peek(key);
+        let given = ["joints", "link", "beam"].into_iter().find_map(peek);
+        let item = given.filter(|_| peek(key).is_none())?;
+        let place = if let Ok(joints) = item.list("") {
+            several_joints(&joints)?
+        } else {
+            let name = item.any_text().ok()?;
+            let is_meant = |of: &Joint| of.beam.as_ref().is_some_and(|beam| beam.name == name);
+            let joint = self.joints.iter().position(is_meant)? + 1;
+            format!("write {key} = {joint}, the joint of beam {name:?}")
+        };
+        Some(item.error(InputErrorKind::MisplacedKey { place }))
     }
 
     fn read_moving_joint(&mut self, key: &str) -> Result<usize, InputError> {

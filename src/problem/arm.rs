@@ -18,7 +18,8 @@ pub(super) fn read_joints(
 ) -> Result<(Vec<Joint>, bool), InputError> {
     if let Some(item) = root.peek("joints").filter(Item::holds_tables) {
         let known = vec!["joint".to_owned()];
-        return Err(item.error(InputErrorKind::UnknownKey { key: "joints".to_owned(), known }));
+        let (key, meant) = ("joints".to_owned(), None);
+        return Err(item.error(InputErrorKind::UnknownKey { key, meant, known }));
     }
     let form_is_declared = root.peek("dh").is_some();
     let form = root

@@ -164,11 +164,11 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         held_out_location = item.location();
         held_out = Some(match item.text() {
             Ok("none") => HeldOut::Nothing,
-            Ok(_) => return Err(item.error(InputErrorKind::NotOneHeldOut)),
-            Err(_) if !item.holds_tables() => {
-                return Err(item.error(InputErrorKind::NotOneHeldOut));
+            Err(_) if item.holds_tables() => read_held_out_rows(item.section()?)?,
+            text => {
+                let word = text.ok().map(str::to_owned);
+                return Err(item.error(InputErrorKind::NotOneHeldOut { word }));
             }
-            Err(_) => read_held_out_rows(item.section()?)?,
         });
     }
     let reference_temperature = section.number("reference_temperature", Unit::Temperature)?;
@@ -259,6 +259,6 @@ fn read_held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputErro
             let seed = seed.map_or(Ok(0), |seed| seed.whole(0))?;
             Ok(HeldOut::Fraction { fraction, seed })
         }
-        _ => Err(section.error(InputErrorKind::NotOneHeldOut)),
+        _ => Err(section.error(InputErrorKind::NotOneHeldOut { word: None })),
     }
 }

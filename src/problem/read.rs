@@ -38,12 +38,13 @@ impl Problem {
     pub fn read_with_text(path: &Path) -> Result<(Self, Arc<str>), InputError> {
         let file = if path.is_dir() { path.join("problem.toml") } else { path.to_owned() };
         let closed = file.with_file_name("problem.closed.toml");
-        let missing = if path.is_dir() && closed.is_file() {
-            InputErrorKind::FolderOfResults { closed }
+        let remedy = if path.is_dir() && closed.is_file() {
+            format!("the folder holds the results of a loop: give {}", closed.display())
         } else {
-            InputErrorKind::ProblemMissing
+            let other = || "give a problem.toml or the folder that holds one".to_owned();
+            problem_within(path).unwrap_or_else(other)
         };
-        let document = Document::read(&file, missing)?;
+        let document = Document::read(&file, InputErrorKind::ProblemMissing { remedy })?;
         Ok((problem_of(&document)?, document.text))
     }
 
@@ -88,7 +89,20 @@ impl Problem {
     }
 }
 
+/// Returns the remedy for a folder that holds no problem, but a folder with one; `None` for others.
+fn problem_within(path: &Path) -> Option<String> {
+    let folders = path.read_dir().ok()?.flatten().map(|entry| entry.path());
+    let folder = folders.filter(|folder| folder.join("problem.toml").is_file()).min()?;
+    let file = folder.join("problem.toml");
+    Some(format!("there is {}: give {}", file.display(), folder.display()))
+}
+
 fn problem_of(document: &Document) -> Result<Problem, InputError> {
+    if document.text.trim().is_empty() {
+        let expected = "a problem.toml; flexcal init makes one of a URDF or of a data sheet";
+        let kind = InputErrorKind::OtherFormat { found: "an empty file", expected };
+        return Err(document.locate(0..0).error(kind));
+    }
     problem(Section::new(document, String::new(), 0..0, document.table()?.get_ref()))
 }
 

@@ -7,7 +7,9 @@ use nalgebra::Vector3;
 use toml::de::DeTable;
 
 use super::item::{Document, Item, join};
-use crate::error::{InputError, InputErrorKind, Location, nearest, one_typo, shortened};
+use crate::error::{
+    InputError, InputErrorKind, Location, nearest, one_typo, other_names, shortened,
+};
 use crate::laws::NAMES;
 use crate::quantity::{Suffix, Unit};
 
@@ -49,10 +51,12 @@ impl<'a, 'i> Section<'a, 'i> {
     pub fn missing(&self, key: &str, write: impl Into<String>) -> InputError {
         let unread =
             self.entries().into_iter().map(|(key, _)| key).filter(|key| !self.was_read(key));
-        let kind = InputErrorKind::MissingKey {
-            write: write.into(),
-            near: nearest(key, unread).map(str::to_owned),
-        };
+        let wanted = [key.to_owned()];
+        let is_meant = |other: &&str| !other_names(other, &wanted).is_empty();
+        let unread: Vec<&str> = unread.collect();
+        let near = unread.iter().find(|other| is_meant(other)).copied();
+        let near = near.or_else(|| nearest(key, unread)).map(str::to_owned);
+        let kind = InputErrorKind::MissingKey { write: write.into(), near };
         self.location().with_key(join(&self.path, key)).error(kind)
     }
 
@@ -238,6 +242,7 @@ impl<'a, 'i> Section<'a, 'i> {
                 Some(place) => InputErrorKind::MisplacedKey { place },
                 None => InputErrorKind::UnknownKey {
                     key: shortened(key, 80),
+                    meant: item.renamed(&other_names(key, &self.keys_read)),
                     known: self.keys_read.clone(),
                 },
             })),
@@ -287,6 +292,14 @@ const SECTION_KEYS: [(&str, &[&str]); 5] = [
     ("joint", &["alpha_deg", "a_m", "a_mm", "theta_deg", "d_m", "d_mm", "min_deg", "max_deg"]),
 ];
 
+/// Sections of a joint that are often written at the top level, with their headers.
+const PARTS_OF_JOINTS: [(&str, &str); 4] = [
+    ("body", "[[joint.body]]"),
+    ("beam", "[joint.beam]"),
+    ("hoist", "[joint.beam.hoist]"),
+    ("mass", "[[joint.body]] or, on a beam, [[joint.beam.mass]]"),
+];
+
 /// Returns true if a key belongs to a section directly.
 pub(super) fn is_key_of(section: &str, key: &str) -> bool {
     SECTION_KEYS.iter().any(|(name, keys)| *name == section && keys.contains(&key))
@@ -296,6 +309,14 @@ impl Section<'_, '_> {
     /// Returns the place where an unknown key belongs; `None` if it is a key of no section, or is
     /// similar to a key that is known at its place.
     fn proper_place(&self, key: &str) -> Option<String> {
+        let is_top = self.path.is_empty() && self.was_read("joint");
+        let part = PARTS_OF_JOINTS.iter().find(|(part, _)| is_top && *part == key);
+        if let Some((part, header)) = part {
+            return Some(format!(
+                "a {part} belongs to a joint; write its header as {header}, below the [[joint]] \
+                 that has it"
+            ));
+        }
         let place = proper_place(key, &self.keys_read)?;
         Some(self.place_above(key).unwrap_or(place))
     }

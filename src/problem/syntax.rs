@@ -180,7 +180,6 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
     let marks = ["<<<<<<<", "=======", ">>>>>>>", "|||||||"];
     let unit = number_and_unit(value).map(|(_, unit)| unit);
     let is_repeated_header = message.contains("duplicate key") && before.starts_with('[');
-    let has_no_equals = message.contains("key with no value");
     let mistakes = [
         (
             marks.iter().any(|mark| line.starts_with(mark)),
@@ -256,6 +255,54 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
             "delete it",
         ),
         (is_repeated_header, "the section is given twice", remedy_of_header(before, word)),
+    ];
+    let mistake = mistakes.into_iter().find(|(is_it, ..)| *is_it);
+    let mistake = mistake.map(|(_, what, remedy)| (what.to_owned(), remedy));
+    mistake.or_else(|| mistaken_form(before, after, message, word))
+}
+
+/// Returns a usual mistake in the form of a line with its remedy, at a place between `before` and
+/// `after` where the parser says `message`; `word` begins there.
+fn mistaken_form(
+    before: &str,
+    after: &str,
+    message: &str,
+    word: &str,
+) -> Option<(String, &'static str)> {
+    let is_value = before.trim_end().ends_with(['=', '[', ',']);
+    let is_bare = is_value
+        && word.starts_with(char::is_alphabetic)
+        && !word.contains(['"', '\''])
+        && (message.contains("must be quoted") || message.starts_with("invalid"));
+    let is_rule = before.split('=').next().is_some_and(|key| key.contains(['.', '*']));
+    let last_word = before.rsplit(['{', ',']).next().unwrap_or_default().trim();
+    let is_colon = last_word.strip_suffix(':').is_some_and(|key| {
+        !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-\"".contains(c))
+    }) && !is_value;
+    let is_lone_flag = after.starts_with('}') && ["free", "fixed"].contains(&last_word);
+    let has_values_behind = after.trim_start().starts_with(',')
+        && before.contains('=')
+        && message.contains("expected newline")
+        && !before.trim_end().ends_with('=');
+    let has_no_equals = message.contains("key with no value");
+    let mistakes = [
+        (
+            is_lone_flag || (is_rule && is_value && ["free", "fixed"].contains(&word)),
+            "a rule is a table in braces",
+            "write { free = true } to free parameters, { fixed = true } to hold them",
+        ),
+        (is_bare, "text without quotes", "text stands in quotes, as in kind = \"fixed\""),
+        (
+            has_values_behind,
+            "several values or keys on one line",
+            "write a list in brackets, as in [\"a.csv\", \"b.csv\"], and each key on its own line",
+        ),
+        (is_colon, "a colon in place of =", "write key = value"),
+        (
+            message.contains("missing assignment"),
+            "a key without =",
+            "write key = value, as in { joint = 2 }",
+        ),
         (
             has_no_equals && line_has_spaced_key(after),
             "a key with a space",
@@ -328,6 +375,7 @@ fn single_brackets(
 /// Returns true if the first word of a key is followed by more words, and then by an equals sign.
 fn line_has_spaced_key(after: &str) -> bool {
     after.split_once('=').is_some_and(|(words, _)| {
-        !words.trim().is_empty() && words.chars().all(|c| c.is_alphanumeric() || c == ' ')
+        !words.trim().is_empty()
+            && words.chars().all(|c| c.is_alphanumeric() || " []()°/%.-".contains(c))
     })
 }

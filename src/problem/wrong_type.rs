@@ -65,10 +65,38 @@ impl Item<'_, '_> {
             {
                 Some(write(if number.as_str() == "1" { "true" } else { "false" }))
             }
-            ("a number", DeValue::Array(_)) => {
+            ("a number", DeValue::Array(_))
+                if ["min", "max"].contains(&name.split('_').next()?) =>
+            {
                 let (end, suffix) = name.split_once('_')?;
                 let [least, most] = self.pair().ok().filter(|_| ["min", "max"].contains(&end))?;
                 Some(format!("write min_{suffix} = {least} and max_{suffix} = {most}"))
+            }
+            ("a number" | "a whole number", DeValue::Array(list)) => {
+                if name == "joint" && self.key.starts_with("effect") && list.len() > 1 {
+                    let joints = self.list("").ok()?;
+                    return several_joints(&joints);
+                }
+                let [one] = self.list("").ok()?.try_into().ok()?;
+                Some(write(Self::written_number(&one)?))
+            }
+            ("text in quotes", DeValue::Array(_)) => {
+                let [one] = self.list("").ok()?.try_into().ok()?;
+                Some(write(&format!("{:?}", Self::any_text(&one).ok()?)))
+            }
+            ("a table, { key = value }", DeValue::Array(list)) if self.holds_tables() => {
+                let header: String = self.key.split(['[', ']']).step_by(2).collect();
+                let only = if list.len() > 1 { ", and keep one" } else { "" };
+                Some(format!("write its header in single brackets, [{header}]{only}"))
+            }
+            ("a table, { key = value }", DeValue::String(text))
+                if self.key.starts_with("effect") =>
+            {
+                let number = text.trim_start_matches("joint").trim();
+                let names = self.names_of("joint", &["name"]);
+                let place = names.iter().position(|name| name == number).map(|place| place + 1);
+                let joint = number.parse().ok().or(place)?;
+                Some(write(&format!("{{ joint = {joint} }}")))
             }
             ("a table, { key = value }", DeValue::Integer(_)) if self.key.starts_with("effect") => {
                 Some(write(&format!("{{ joint = {} }}", self.written_number()?)))
@@ -118,6 +146,19 @@ impl Item<'_, '_> {
         }
     }
 
+    /// Returns this entry with the keys that its key is another name of, where its value shows how
+    /// to write it: one file, or both limits. `None` for other entries.
+    pub(super) fn renamed(&self, names: &[&str]) -> Option<String> {
+        match (names, self.value) {
+            (["files"], DeValue::String(file)) => Some(format!("files = [{file:?}]")),
+            ([min, max], DeValue::Array(_)) if min.starts_with("min") && max.starts_with("max") => {
+                let [least, most] = self.pair().ok()?;
+                Some(format!("{min} = {least}, {max} = {most}"))
+            }
+            _ => None,
+        }
+    }
+
     /// Returns the texts at `path` in the tables `[[list]]` of the file that holds this value, in
     /// the order of the file.
     fn names_of(&self, list: &str, path: &[&str]) -> Vec<String> {
@@ -137,6 +178,13 @@ impl Item<'_, '_> {
         }
         names.map(|table| name(table).unwrap_or_default()).collect()
     }
+}
+
+/// Returns the remedy for an effect with a list of `joints`; `None` if they are no numbers.
+pub(super) fn several_joints(joints: &[Item<'_, '_>]) -> Option<String> {
+    let arguments = joints.iter().map(|joint| Some(format!("joint = {}", joint.written_number()?)));
+    let arguments = arguments.collect::<Option<Vec<_>>>()?;
+    Some(format!("write an [[effect]] for each of them, with {}", arguments.join(" and ")))
 }
 
 /// Splits a text into a number and the unit behind it; `None` for other texts.

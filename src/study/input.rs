@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{InputError, InputErrorKind, StudyErrorKind};
 use crate::problem::Problem;
-use crate::problem::item::{Document, Item};
+use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::quantity::Unit;
 
@@ -16,16 +16,13 @@ pub(super) fn problem_of(
     item: &Item<'_, '_>,
     folder: &Path,
 ) -> Result<(Problem, String, PathBuf), InputError> {
-    let mut file = path_beside(item, folder)?;
-    if file.is_dir() {
-        file.push("problem.toml");
-    }
-    let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
-    let problem = Problem::parse(&document.text, &file)?;
+    let path = path_beside(item, folder)?;
+    let (problem, text) = Problem::read_with_text(&path)?;
+    let file = if path.is_dir() { path.join("problem.toml") } else { path };
     if !problem.fixtures.is_empty() {
         return Err(item.error(StudyErrorKind::PositionsOnly));
     }
-    Ok((problem, document.text.to_string(), file))
+    Ok((problem, text.to_string(), file))
 }
 
 /// Returns the path of a file that the study names relative to `folder`, the folder of the study.

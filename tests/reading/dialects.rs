@@ -252,7 +252,10 @@ fn wrong_maps_are_named() {
         assert_says(&table_error(&problem(&by_name), table), &words);
     }
     for (format, words) in [
-        ("delimiter = '/'", "problem.toml:6: data.format.delimiter: \"/\" is none of ,, ;, |"),
+        (
+            "delimiter = '/'",
+            "problem.toml:6: data.format.delimiter: \"/\" is none of \",\", \";\", \"|\"",
+        ),
         (
             "delimiter = ','\ndecimal = ','",
             "problem.toml:7: data.format.decimal: a decimal comma needs another delimiter",

@@ -14,7 +14,7 @@ use crate::common::reading::{problem_error, read_tables};
 #[test]
 fn whole_problems() {
     let mistakes: [(&str, &[&str]); 32] = [
-        ("", &["problem.toml:1: name: missing"]),
+        ("", &["problem.toml:1: an empty file, not a problem.toml; flexcal init makes one"]),
         ("name = ''", &[":1: name: empty"]),
         ("name = 'a/b'", &[":1: name: ", "cannot name a folder"]),
         ("name = '..'", &[":1: name: "]),

@@ -2,6 +2,7 @@
 
 mod files;
 mod meant;
+mod other_names;
 mod reading;
 mod sections;
 mod tables;

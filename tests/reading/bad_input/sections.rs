@@ -222,7 +222,6 @@ fn other_sections() {
         ),
         ("[data]\nfiles = 'a.csv'", &[":4: data.files: expected a list"]),
         ("[data]\nfiles = [1]", &[":4: data.files[1]: expected text"]),
-        ("[data]\nfile = 'a.csv'", &[":4: data.file: unknown key (did you mean files?)"]),
         ("[data]\nheld_out = {}", &[":4: data.held_out: give one of"]),
         ("[data]\nheld_out = { seed = 1 }", &[":4: data.held_out: give one of"]),
         ("[data]\nheld_out = { column = 'a', session = 'b' }", &[":4: data.held_out: give one of"]),
