@@ -39,6 +39,33 @@ const CORRECTED_IN_TABLE: [FindingCode; 4] = [
     FindingCode::ViewsReversed,
 ];
 
+/// Returns the search for causes that follows a fit, or the application of one that a loop has
+/// searched already. `is_partial` is true if the fit holds parameters of the problem; `to_apply`
+/// returns the command that applies the estimate and does what its argument says.
+fn search_or_apply(
+    common: &Common,
+    problem: &Problem,
+    is_partial: bool,
+    to_apply: impl Fn(&str) -> String,
+) -> String {
+    let named = common.problem_arguments();
+    // A loop that wrote the problem, or its remainder, has searched for causes already.
+    let is_closed = common.problem_file().ends_with("problem.closed.toml");
+    if is_partial {
+        format!("flexcal identify {named} fits all parameters at once, elasticity included")
+    } else if problem.remainder.is_some() {
+        format!(
+            "flexcal trace {named} ranks candidates for what is left; {}",
+            to_apply("applies the estimate with its remainder")
+        )
+    } else if is_closed && !measures_no_position(problem) {
+        let apply = to_apply("corrects commands, with the error bound stated");
+        format!("{apply}; flexcal trace {named} ranks candidates for what is left")
+    } else {
+        format!("flexcal loop {named} looks for what the model lacks")
+    }
+}
+
 /// Returns what to do after a fit, as a command or in words. `is_structured` is true if the
 /// residual tests detect structure; `estimate` is the path of the estimate.json that was written.
 pub fn after_fit(
@@ -65,21 +92,7 @@ pub fn after_fit(
     let as_warned =
         |what: &str| format!("{what} as the warning says, then flexcal identify {named}");
     let correct = || as_warned(&format!("correct the table or {file}"));
-    // A loop that wrote the problem, or its remainder, has searched for causes already.
-    let is_closed = common.problem_file().ends_with("problem.closed.toml");
-    let search = if is_partial {
-        format!("flexcal identify {named} fits all parameters at once, elasticity included")
-    } else if problem.remainder.is_some() {
-        format!(
-            "flexcal trace {named} ranks candidates for what is left; {}",
-            to_apply("applies the estimate with its remainder")
-        )
-    } else if is_closed && !measures_no_position(problem) {
-        let apply = to_apply("corrects commands, with the error bound stated");
-        format!("{apply}; flexcal trace {named} ranks candidates for what is left")
-    } else {
-        format!("flexcal loop {named} looks for what the model lacks")
-    };
+    let search = search_or_apply(common, problem, is_partial, to_apply);
     match report::influential_rows_advice(found, &common.problem_file()) {
         _ if !found.is_trusted() && CORRECTED_IN_TABLE.iter().any(|code| found.has(*code)) => {
             as_warned("correct the table")

@@ -64,8 +64,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (rows, warnings) = common.read_rows(&problem, Measurements::read_to_predict)?;
     let rows = rows.arm_rows();
     common.warn(&warnings);
-    let read = |file| arguments.trust.read(file);
-    let estimate = arguments.estimate.as_deref().map(read).transpose()?;
+    let estimate = arguments.estimate.as_deref();
+    let estimate = estimate.map(|file| arguments.trust.read(file)).transpose()?;
     let trusted = estimate.as_ref().is_none_or(|estimate| estimate.trusted);
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");

@@ -76,8 +76,10 @@ pub(super) fn key_suggestion(key: &str, meant: Option<&str>, known: &[String]) -
         } else {
             ""
         };
-        let joiner =
-            if others.len() == 2 && others[0].starts_with("min") { " and " } else { " or " };
+        let joiner = match others.as_slice() {
+            [first, _] if first.starts_with("min") => " and ",
+            _ => " or ",
+        };
         return format!(" (did you mean {}?{note})", others.join(joiner));
     }
     let near = suggestion(key, known);

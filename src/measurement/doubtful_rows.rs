@@ -151,26 +151,33 @@ impl Measurements {
         let is_position = |row: &usize| self.observation(*row) == Observation::default();
         let rows: Vec<usize> = (0..self.positions.len()).filter(is_position).collect();
         let session = |row: usize| self.session.of_row.get(row).copied().unwrap_or(0);
-        let mut middles: BTreeMap<usize, [Vec<f64>; 3]> = BTreeMap::new();
-        for &row in &rows {
-            let axes = middles.entry(session(row)).or_default();
-            axes.iter_mut().zip(self.positions[row].iter()).for_each(|(axis, x)| axis.push(*x));
+        let mut axes: BTreeMap<usize, [Vec<f64>; 3]> = BTreeMap::new();
+        for (&row, position) in rows.iter().filter_map(|row| Some((row, self.positions.get(*row)?)))
+        {
+            let of_session = axes.entry(session(row)).or_default();
+            for (axis, x) in of_session.iter_mut().zip(position) {
+                axis.push(*x);
+            }
         }
-        let middles: BTreeMap<usize, Vector3<f64>> = middles
+        let middle = |mut axis: Vec<f64>| {
+            axis.sort_by(f64::total_cmp);
+            axis.get(axis.len() / 2).copied().unwrap_or_default()
+        };
+        let middles: BTreeMap<usize, Vector3<f64>> = axes
             .into_iter()
-            .map(|(session, mut axes)| {
-                axes.iter_mut().for_each(|axis| axis.sort_by(f64::total_cmp));
-                (session, Vector3::from(axes.map(|axis| axis[axis.len() / 2])))
-            })
+            .map(|(session, axes)| (session, Vector3::from(axes.map(middle))))
             .collect();
-        let off = |row: &usize| self.positions[*row] - middles[&session(*row)];
+        let off = |row: &usize| {
+            let of_row = self.positions.get(*row).zip(middles.get(&session(*row)));
+            of_row.map_or_else(Vector3::zeros, |(position, middle)| position - middle)
+        };
         let far: Vec<usize> = rows.iter().copied().filter(|row| off(row).norm() > reach).collect();
         let &row = far.first().filter(|_| {
             reach.is_finite() && reach > 0.0 && MIN_ROWS_TO_ONE_FAR * far.len() <= rows.len()
         })?;
         let (axis, offset) = (off(&row).iamax(), off(&row).amax());
-        let value = self.positions[row][axis];
-        let middle = value - off(&row)[axis];
+        let value = *self.positions.get(row)?.get(axis)?;
+        let middle = value - off(&row).get(axis)?;
         let is_lost = |power: &i32| (value / 10_f64.powi(*power) - middle).abs() < reach / 2.0;
         let hint =
             if (1..=6).any(|power| is_lost(&power)) { ": is a decimal point lost?" } else { "" };

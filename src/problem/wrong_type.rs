@@ -104,18 +104,7 @@ impl Item<'_, '_> {
             ("a table, { key = value }", DeValue::Integer(_)) if name == "mimic" => {
                 Some(write(&format!("{{ joint = {}, ratio = 1 }}", self.written_number()?)))
             }
-            ("text in quotes", _) if name == "link" => {
-                let names = self.names_of("joint", &["beam", "name"]);
-                let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
-                Some(match names.first() {
-                    Some(first) => format!(
-                        "write the name of a beam, {}: {}",
-                        names.join(" or "),
-                        write(first)
-                    ),
-                    None => "write the name of a beam; this arm has none".to_owned(),
-                })
-            }
+            ("text in quotes", _) if name == "link" => Some(self.name_of_a_beam(write)),
             ("text in quotes", DeValue::Integer(number)) if ["on", "at"].contains(&name) => {
                 Some(write(&format!("\"joint{}\"", number.as_str())))
             }
@@ -143,6 +132,18 @@ impl Item<'_, '_> {
                 Some(format!("if both are alike, {}", write(&format!("[{number}, {number}]"))))
             }
             _ => None,
+        }
+    }
+
+    /// Returns the remedy for a value that is no name of a beam; `write` completes the key.
+    fn name_of_a_beam(&self, write: impl Fn(&str) -> String) -> String {
+        let names = self.names_of("joint", &["beam", "name"]);
+        let names: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+        match names.first() {
+            Some(first) => {
+                format!("write the name of a beam, {}: {}", names.join(" or "), write(first))
+            }
+            None => "write the name of a beam; this arm has none".to_owned(),
         }
     }
 

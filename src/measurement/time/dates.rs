@@ -108,7 +108,7 @@ pub(crate) fn date_part(text: &str) -> &str {
     const MAX_LENGTH: usize = 40;
     let is_date = |date: &&str| matches!(Date::read(&tokens(date)), Some((_, [])));
     let dates = (0..text.len().min(MAX_LENGTH)).filter_map(|end| text.get(..end)).filter(is_date);
-    Instant::read(text).and_then(|_| dates.last()).unwrap_or(text)
+    Instant::read(text).and_then(|_| dates.rev().next()).unwrap_or(text)
 }
 
 /// Meaning of the three numbers of a date.
@@ -152,7 +152,7 @@ impl Date {
                 rest @ ..,
             ] => {
                 let second = short(second)?;
-                let units = [mark, other].map(|mark| mark.as_str());
+                let units = [mark, other].map(String::as_str);
                 let has_units = matches!(units, ["年", "月"] | ["년", "월"]);
                 if first.len() == 4 && (has_units || mark == other && is_one_of(mark, "-/.:_")) {
                     return Some((clear(first.parse().ok()?, second, short(third)?), rest));
