@@ -36,6 +36,7 @@ mod reevaluation;
 mod replacements;
 mod sag;
 mod search;
+mod set;
 mod settling;
 mod sites;
 mod waves;

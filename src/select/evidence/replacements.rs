@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::block::Block;
 use super::products::Products;
-use super::search::{Set, assembled, best_first, extended, sorted};
+use super::set::{Set, assembled, best_first, extended, sorted};
 
 /// Number of most probable sets in which a function of several covariates is replaced by two
 /// hypotheses.
@@ -56,10 +56,10 @@ pub(super) fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, produc
         for (removed, set) in surfaces.take(MAX_SPLIT_SETS).chain(of_best) {
             let remaining: Vec<usize> =
                 set.members.iter().copied().filter(|member| !removed.contains(member)).collect();
-            let kind = match removed.as_slice() {
-                &[only] if blocks[only].is_surface => 0,
-                &[only] if blocks[only].is_whole_law => 3,
-                &[_] => 1,
+            let kind = match *removed.as_slice() {
+                [only] if blocks[only].is_surface => 0,
+                [only] if blocks[only].is_whole_law => 3,
+                [_] => 1,
                 _ => 2,
             };
             let key = sorted(&remaining);
@@ -177,7 +177,8 @@ mod tests {
     use crate::select::evidence::block::{Block, Design};
     use crate::select::evidence::marginal::{Coefficients, Noise};
     use crate::select::evidence::products::{Products, ResidualModel};
-    use crate::select::evidence::search::{search, sorted};
+    use crate::select::evidence::search::search;
+    use crate::select::evidence::set::sorted;
     use crate::select::neighbourhood::{LinearNeighbourhood, Unknowns};
 
     /// Returns a column of deterministic numbers without pattern.

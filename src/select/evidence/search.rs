@@ -1,15 +1,13 @@
 //! Sets of hypotheses by their probability: a beam search over sets of blocks of columns.
 
 use crate::select::settings::{BEAM_WIDTH, LOG_ODDS_CUTOFF, MAX_EFFECTS, MAX_EXTENDING};
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::block::Block;
 use super::products::{Products, ReducedProblem};
 use super::replacements::add_replacements;
-use super::settling::converged_sizes;
+use super::set::{Set, assembled, best_first, extended, sorted};
 
 /// Number of most probable sets in which the sizes of the members (1 σ of their coefficients) are
 /// iterated to convergence at the end.
@@ -17,10 +15,6 @@ const MAX_SETTLED_SETS: usize = 32;
 
 /// Smallest probability of a set that a search returns. All other sets together have less than 1e-12.
 const MIN_LISTED_PROBABILITY: f64 = 1e-20;
-
-/// Largest difference of ln posteriors that rounding alone causes between sets of the same members
-/// in another order. The order found first is kept, so that effects are listed alike everywhere.
-const MAX_ROUNDING_OF_LN_POSTERIOR: f64 = 1e-6;
 
 /// Set of hypotheses with its probability among all sets evaluated.
 #[derive(Debug, Clone)]
@@ -36,69 +30,6 @@ impl EvaluatedSet {
     /// Returns the members for which `is_removed` is false, in the order in which they were added.
     pub fn without(&self, is_removed: impl Fn(usize) -> bool) -> Vec<usize> {
         self.members.iter().copied().filter(|&member| !is_removed(member)).collect()
-    }
-}
-
-/// Set with the sizes of its members and ln of its posterior, up to a constant.
-#[derive(Debug, Clone)]
-pub(super) struct Set {
-    pub members: Vec<usize>,
-    sizes: Vec<f64>,
-    /// ln of likelihood times prior, relative to the likelihood of noise alone.
-    pub ln_posterior: f64,
-}
-
-impl Set {
-    /// Returns the members in ascending order, which identify the set.
-    pub fn key(&self) -> Vec<usize> {
-        sorted(&self.members)
-    }
-
-    /// Returns the set with one more hypothesis, given its gain and most probable size.
-    fn with(&self, block: usize, (gain, size): (f64, f64), products: &Products) -> Self {
-        Self {
-            members: [self.members.as_slice(), &[block]].concat(),
-            sizes: [self.sizes.as_slice(), &[size]].concat(),
-            ln_posterior: self.ln_posterior
-                + gain
-                + products.ln_prior(&products.blocks[block], &self.members),
-        }
-    }
-
-    /// Returns true if the set is more probable than another one by more than rounding.
-    pub fn exceeds(&self, other: &Self) -> bool {
-        self.ln_posterior > other.ln_posterior + MAX_ROUNDING_OF_LN_POSTERIOR
-    }
-
-    /// Returns true if the set is not extended because of a member for which [`Block::is_wide`] is
-    /// true.
-    pub fn has_wide(&self, blocks: &[Block]) -> bool {
-        self.members.iter().any(|&member| blocks[member].is_wide())
-    }
-
-    /// Returns the set with the converged size of each member, given all others, and its posterior
-    /// at these sizes.
-    ///
-    /// Sizes are relative to the noise, which includes effects that are not explained yet. Without
-    /// this step, members that were added first would have too small a size. ln p(r | set) = l + Σ
-    /// (ln p(r | the others, k) − l), with l at the sizes of all members, and ln p(r | the others,
-    /// k) averaged over the size of member k.
-    pub fn settled(self, products: &Products) -> Self {
-        if self.has_wide(products.blocks) { self } else { self.with_converged_sizes(products) }
-    }
-
-    /// Returns the set with converged sizes, regardless of how many columns its members have.
-    fn with_converged_sizes(mut self, products: &Products) -> Self {
-        if self.members.len() < 2 {
-            return self;
-        }
-        let settled = products.settled((&self.members, &self.sizes), || {
-            converged_sizes(products, &self.members, &self.sizes)
-        });
-        if let Some((sizes, ln_posterior)) = settled {
-            (self.sizes, self.ln_posterior) = (sizes, ln_posterior);
-        }
-        self
     }
 }
 
@@ -220,19 +151,6 @@ fn add_periodic_errors(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Pro
     }
 }
 
-/// Compares sets by their posteriors; the more probable one is the lesser.
-pub(super) fn best_first(a: &Set, b: &Set) -> Ordering {
-    b.ln_posterior.total_cmp(&a.ln_posterior)
-}
-
-/// Returns, for each of the `tried` hypotheses, the set extended by it.
-pub(super) fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
-    let new: Vec<usize> =
-        tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
-    let gains = products.gains(&set.members, &set.sizes, &new);
-    new.into_iter().zip(gains).map(|(block, gain)| set.with(block, gain, products)).collect()
-}
-
 /// Returns ln p(r | all blocks together), up to a constant, plus ln of their prior; `None` if a
 /// factorisation fails.
 pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
@@ -264,30 +182,13 @@ pub(super) fn gains_beside(
     tried.iter().zip(left.gains(tried)).map(gain).collect()
 }
 
-/// Creates a set from the hypotheses `members`. The size of each is the most probable one when it
-/// is added to the earlier members. `None` if a Cholesky factorisation fails.
-pub(super) fn assembled(members: &[usize], products: &Products) -> Option<Set> {
-    let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
-    for &member in members {
-        let gain = products.reduced(&set.members, &set.sizes)?.gain(member);
-        set = set.with(member, gain, products);
-    }
-    Some(set.settled(products))
-}
-
-pub(super) fn sorted(members: &[usize]) -> Vec<usize> {
-    let mut members = members.to_vec();
-    members.sort_unstable();
-    members
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
     use crate::fit::Stop;
-    use crate::select::evidence::block::Design;
+    use crate::select::evidence::block::{Block, Design};
     use crate::select::evidence::marginal::{Coefficients, Noise};
     use crate::select::evidence::products::ResidualModel;
     use crate::select::neighbourhood::{LinearNeighbourhood, Unknowns};
