@@ -128,14 +128,15 @@ pub enum WarningKind {
     )]
     ClockJump { rows: usize, hours: String, by: &'static str },
     #[error(
-        "the arm moved, by the joint table, at the time of {rows} of {of} measured row{}; {}",
-        plural(*of),
+        "the arm moved, by the joint table, at the time of {rows} of {of} measured row{} that have \
+         a partner, the first here{}; {}",
+        plural(*of), listed(*rows, others),
         offset.as_ref().map_or_else(
             || "check offset_s, and the times of these rows".to_owned(),
             |offset| format!("with offset_s = {offset} in joints it rests then")
         )
     )]
-    MovedAtTime { rows: usize, of: usize, offset: Option<String> },
+    MovedAtTime { rows: usize, of: usize, others: Vec<String>, offset: Option<String> },
     #[error(
         "{value:?} is not a date and time such as 2024-05-31T14:03:20.5; ignored, and rows \
          count in their order instead (write {write} for \

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::appended::{JointRow, JointTableFormat};
 use super::clocks::{
-    ClockShift, Rest, best_shift, clock_jump, median_step, moving_arm, nearest, rests, rounded_up,
+    ClockShift, Stops, best_shift, clock_jump, median_step, moving_arm, nearest, rounded_up,
     shifts_by_rows,
 };
 use super::headerless::{holds_numbers, no_header};
@@ -49,8 +49,8 @@ pub(super) struct JoinedLog {
     by_time: Vec<usize>,
     /// Times of the rows in ascending order, on the clock of the measurements \[s\].
     log_times: Vec<f64>,
-    /// Times in which the arm rests, if the joint table logs all the time.
-    rests: Vec<Rest>,
+    /// Times in which the arm stands.
+    stops: Stops,
     /// Column in the current table by which rows are paired; `None` for a join by order.
     key: Option<Key>,
     /// Number of measured rows for which a partner has been searched.
@@ -68,10 +68,10 @@ pub(super) struct JoinedLog {
     unlike_pairs: Vec<[String; 2]>,
     /// Times of the measured rows \[s\], for a join by time.
     times: Vec<f64>,
-    /// Column of the times in the current table of measurements, with which pairs that are joined
-    /// by order are checked; `None` without such a column or for other joins.
+    /// Column of the times in the current table of measurements; `None` without such a column or for
+    /// a join by name.
     clock: Option<Key>,
-    /// Times of the pairs that are joined by order.
+    /// Times of the pairs that are not joined by name.
     timed_pairs: Vec<TimedPair>,
 }
 
@@ -102,7 +102,8 @@ impl JoinedLog {
         joined.log_times = by_time.iter().map(time).collect();
         let key = time_key(&joined.names).map(|key| key.place);
         let timed = by_time.iter().filter_map(|&row| joined.rows.get(row));
-        joined.rests = rests(timed.map(|row| (row.time, &row.source.cells)), &joined.names, key);
+        joined.stops =
+            Stops::of(timed.map(|row| (row.time, &row.source.cells)), &joined.names, key);
         joined.by_time = by_time;
         if joined.rows.is_empty() {
             return Err(log.location.clone().error(TableErrorKind::NoDataFiles));
@@ -187,9 +188,9 @@ impl JoinedLog {
         let names: Vec<String> =
             Names::map_present(table, dialect).into_iter().map(str::to_owned).collect();
         self.key = self.find_key(table, &names)?;
+        self.clock = time_key(&names).filter(|_| self.rule != JoinRule::Name);
         if self.rule == JoinRule::Order {
             self.name_columns = name_column(&names).zip(name_column(&self.names));
-            self.clock = time_key(&names);
         }
         let is_new = |place: &usize| {
             let (name, header) = (self.names.get(*place), self.header.get(*place));
@@ -315,7 +316,7 @@ impl JoinedLog {
     /// the clocks that gives it; `None` if the tables are not joined by time or no shift is certain.
     fn shift(&self) -> Option<(ClockShift, ClockOffset)> {
         let (tolerance, offset) = self.rule.times()?;
-        let shift = best_shift(&self.times, (&self.log_times, &self.rests))?;
+        let shift = best_shift(&self.times, (&self.log_times, &self.stops))?;
         let needs_more = shift.gap > tolerance;
         let found = ClockOffset {
             seconds: ((offset + shift.seconds) * 1e3).round() / 1e3,
@@ -333,9 +334,9 @@ impl JoinedLog {
         shifts.into_iter().map(|(by, shift)| (by, offset + shift)).collect()
     }
 
-    /// Returns true if a shift of the log gives more than the odd measured row another partner.
+    /// Returns true if a shift gives more than the odd measured row a partner of another stop.
     fn changes_partners(&self, shift: ClockShift) -> bool {
-        let partner = |time: f64| nearest(&self.log_times, time).map(|(row, _)| row);
+        let partner = |time: f64| self.stops.nearest(time);
         let is_changed = |time: &&f64| partner(**time) != partner(**time - shift.seconds);
         self.times.iter().filter(is_changed).count() > self.times.len() / MIN_ROWS_PER_ODD_PARTNER
     }
@@ -395,13 +396,13 @@ impl JoinedLog {
             return Ok(());
         }
         if are_most_left {
-            let keys = self.keys().map(Box::new);
-            let gap = self.gap();
+            let (keys, gap) = (self.keys().map(Box::new), self.gap());
             return error(TableErrorKind::MostUnpaired { left, rows, gap, keys, offset });
         }
         let gaps = self.gaps(false);
         let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
-        if usual <= MAX_PLAUSIBLE_MEDIAN_GAP {
+        let is_of_stops = shift.is_some_and(|(shift, _)| shift.is_of_stops);
+        if usual <= MAX_PLAUSIBLE_MEDIAN_GAP && 4 * left <= rows && !is_of_stops {
             return Ok(());
         }
         if let Some(row) = self.common_partner() {
@@ -489,11 +490,11 @@ impl JoinedLog {
             [warning(&self.unpaired, self.gap(), MAX_LISTED_ROWS), warning(&unused, None, 0)];
         let jump = clock_jump(self.rule, (&self.times, &self.log_times), self.unpaired.first());
         let others = unpaired.into_iter().flatten();
-        let others = others.chain(jump.or_else(|| order_contradicted(&self.timed_pairs)));
-        let moving = (&*self.times, &*self.rests);
+        let by_order = if self.rule == JoinRule::Order { &*self.timed_pairs } else { &[] };
+        let others = others.chain(jump.or_else(|| order_contradicted(by_order)));
         let shift =
             || self.shift().map(|(shift, offset)| (shift.seconds, format!("{:?}", offset.seconds)));
-        let others = others.chain(moving_arm(moving, shift, &self.location));
+        let others = others.chain(moving_arm((&self.timed_pairs, &self.stops), shift));
         Ok(self.text_warnings.iter().cloned().chain(others).collect())
     }
 }

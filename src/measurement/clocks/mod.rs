@@ -1,14 +1,14 @@
 //! Constant difference between the clocks of two tables that are joined by time.
 
-use csv::ByteRecord;
+mod stops;
 
 use super::paired_times::median;
 use crate::error::{Location, Warning, WarningKind};
 use crate::problem::JoinRule;
 use crate::quantity::format::two_digits;
+use stops::{PAIR_GAP, Rest, nearest_rest, several_rows};
+pub(super) use stops::{Stops, moving_arm};
 
-/// Maximum time between paired rows when a shift between the clocks is searched \[s\].
-const PAIR_GAP: f64 = 0.5;
 /// Largest such time with which a shift is searched if smaller ones find none \[s\]: readings may
 /// follow a stop by a varying time. Each is twice the one before.
 const MAX_PAIR_GAP: f64 = 32.0;
@@ -31,89 +31,11 @@ const MIN_PAIRED_FRACTION: f64 = 0.8;
 /// certain.
 const MAX_RIVAL_FRACTION: f64 = 0.7;
 
-/// Smallest number of rests by which the clock of a continuous log is found.
-const MIN_RESTS: usize = 5;
-/// Smallest number of rows of a continuous log for each of its rests. A table with fewer has one row
-/// or some repeated ones for each pose.
-const MIN_ROWS_PER_REST: usize = 5;
-/// Largest difference of a joint coordinate between two rows of a log in which the arm rests, by the
-/// unit at the end of its column's name; readings of encoders scatter by less.
-const MAX_RESTING_CHANGES: [(&str, f64); 4] =
-    [("_deg", 0.01), ("_rad", 2e-4), ("_mm", 0.05), ("_m", 5e-5)];
-/// The same for tables in which no name of a column ends with a unit.
-const MAX_RESTING_CHANGE: f64 = 0.01;
 /// Smallest fraction of the tested rows that a shift must pair with rests. Positions are measured
 /// while the arm rests.
 const MIN_RESTING_FRACTION: f64 = 0.97;
 /// Largest number of rests that another shift may pair, as a fraction of those of the best shift.
 const MAX_RESTING_RIVAL_FRACTION: f64 = 0.95;
-
-/// Time \[s\] in which the arm rests by a joint table; both ends are equal for a single row.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Rest {
-    first: f64,
-    last: f64,
-}
-
-impl Rest {
-    fn middle(&self) -> f64 {
-        f64::midpoint(self.first, self.last)
-    }
-}
-
-/// Returns the rests of a joint table that logs all the time, also while the arm moves; empty for
-/// other tables. The rows are given in the order of their times \[s\], each with its cells; the
-/// column `key` holds the times. Columns whose `names` end with a unit of joint coordinates decide,
-/// or all if there are none.
-pub(super) fn rests<'r>(
-    rows: impl Iterator<Item = (f64, &'r ByteRecord)>,
-    names: &[String],
-    key: Option<usize>,
-) -> Vec<Rest> {
-    let limit = |name: &String| {
-        let of_unit = MAX_RESTING_CHANGES.iter().find(|(unit, _)| name.ends_with(unit));
-        of_unit.map(|(_, most)| *most)
-    };
-    let is_any_joint = names.iter().any(|name| limit(name).is_some());
-    // Largest change of each column that is compared.
-    let limits: Vec<Option<f64>> = names
-        .iter()
-        .enumerate()
-        .map(|(place, name)| {
-            let other = (!is_any_joint && Some(place) != key).then_some(MAX_RESTING_CHANGE);
-            limit(name).or(other)
-        })
-        .collect();
-    let number = |cell: &[u8]| str::from_utf8(cell).ok()?.trim().parse::<f64>().ok();
-    let is_same = |one: &[u8], other: &[u8], most: f64| match (number(one), number(other)) {
-        (Some(one), Some(other)) => (one - other).abs() <= most,
-        _ => one == other,
-    };
-    let is_resting = |one: &ByteRecord, other: &ByteRecord| {
-        let mut pairs = one.iter().zip(other).zip(&limits);
-        pairs.all(|((one, other), most)| most.is_none_or(|most| is_same(one, other, most)))
-    };
-    let (mut rests, mut count): (Vec<Rest>, usize) = (Vec::new(), 0);
-    let mut current: Option<(Rest, &ByteRecord)> = None;
-    for (time, cells) in rows {
-        count += 1;
-        current = match current {
-            Some((rest, first)) if is_resting(first, cells) => {
-                Some((Rest { last: time, ..rest }, first))
-            }
-            ended => {
-                rests.extend(ended.map(|(rest, _)| rest));
-                Some((Rest { first: time, last: time }, cells))
-            }
-        };
-    }
-    rests.extend(current.map(|(rest, _)| rest));
-    rests.retain(|rest| rest.first < rest.last);
-    if rests.len() < MIN_RESTS || count < MIN_ROWS_PER_REST * rests.len() {
-        rests.clear();
-    }
-    rests
-}
 
 /// Difference between the clocks of two tables.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,6 +44,8 @@ pub(super) struct ClockShift {
     pub seconds: f64,
     /// Largest time between rows that the shift pairs \[s\]; 0 if they fall into rests.
     pub gap: f64,
+    /// True if it was found by stops of several rows each, of which it is certain.
+    pub is_of_stops: bool,
 }
 
 /// Largest time between rows that an undeclared offset of the clocks pairs, as a fraction of the time
@@ -136,6 +60,9 @@ impl ClockShift {
     /// Returns true if so many rows measured at `times` \[s\] are so near their partners in `log` that
     /// the shift may be taken without being declared.
     pub fn is_clear(self, times: &[f64], log: &[f64]) -> bool {
+        if self.is_of_stops {
+            return true;
+        }
         let is_close = median_step(log).is_some_and(|step| self.gap <= MAX_CLEAR_GAP * step);
         // The row that is next nearest to each must not be its partner as well.
         let is_only = |time: &f64| {
@@ -159,14 +86,50 @@ pub(super) fn median_step(log: &[f64]) -> Option<f64> {
 /// Returns the shift of the times of a joint table with which its rows pair best with the rows
 /// measured at `times` \[s\].
 ///
-/// `log` are the times of the joint table in ascending order \[s\], and `rests` those in which the
-/// arm rests. The least time between paired rows that makes a shift certain is taken. Returns `None`
+/// `log` are the times of the joint table in ascending order \[s\], and `stops` those in which the
+/// arm stands. The least time between paired rows that makes a shift certain is taken. Returns `None`
 /// if no shift pairs most rows, or if several do.
-pub(super) fn best_shift(times: &[f64], (log, rests): (&[f64], &[Rest])) -> Option<ClockShift> {
+pub(super) fn best_shift(times: &[f64], (log, stops): (&[f64], &Stops)) -> Option<ClockShift> {
     let resting = (MIN_PAIRS, MIN_RESTING_FRACTION, MAX_RESTING_RIVAL_FRACTION);
-    if let Some(seconds) = shift_to(times, (rests, PAIR_GAP), resting) {
-        return Some(ClockShift { seconds, gap: 0.0 });
+    if let Some(seconds) = shift_to(times, (&stops.rests, PAIR_GAP), resting) {
+        return Some(ClockShift { seconds, gap: 0.0, is_of_stops: false });
     }
+    shift_by_stops(times, log, &stops.runs).or_else(|| shift_by_rows(times, log))
+}
+
+/// Returns the shift of a joint table with several rows for each stop, found by the first row of each.
+///
+/// Every offset with which all measured rows fall into their stops gives them the same joint
+/// coordinates; the middle one is returned. Returns `None` if there is no such offset, or if the
+/// shift would not be clear by a table of the first rows alone.
+fn shift_by_stops(times: &[f64], log: &[f64], runs: &[Rest]) -> Option<ClockShift> {
+    if runs.len() == log.len() {
+        return None;
+    }
+    // Single rows are logged on the way if there is a longer stop for nearly every measured row.
+    let several = several_rows(runs);
+    let is_logged_on_the_way = several.len() as f64 >= MIN_PAIRED_FRACTION * times.len() as f64;
+    let stops = if is_logged_on_the_way { several.as_slice() } else { runs };
+    let first: Vec<f64> = stops.iter().map(|stop| stop.first).collect();
+    let arrival = shift_by_rows(times, &first).filter(|shift| shift.is_clear(times, &first))?;
+    let paired: Vec<(f64, Rest)> = times
+        .iter()
+        .filter_map(|&time| {
+            let (stop, gap) = nearest(&first, time - arrival.seconds)?;
+            Some((time, *stops.get(stop)?)).filter(|_| gap <= arrival.gap)
+        })
+        .collect();
+    let least = paired.iter().map(|(time, stop)| time - stop.last).fold(f64::MIN, f64::max);
+    let most = paired.iter().map(|(time, stop)| time - stop.first).fold(f64::MAX, f64::min);
+    let seconds = f64::midpoint(least, most);
+    let gaps = paired.iter().filter_map(|(time, _)| Some(nearest(log, time - seconds)?.1));
+    let gap = gaps.fold(0.0, f64::max);
+    (least <= most).then_some(ClockShift { seconds, gap, is_of_stops: true })
+}
+
+/// Returns the shift with which the rows of a joint table pair best with the rows measured at
+/// `times` \[s\]; `None` if none is certain.
+fn shift_by_rows(times: &[f64], log: &[f64]) -> Option<ClockShift> {
     if log.len() > MAX_LOG_ROWS {
         return None;
     }
@@ -178,7 +141,7 @@ pub(super) fn best_shift(times: &[f64], (log, rests): (&[f64], &[Rest])) -> Opti
         let seconds = shift_to(times, (&rows, most), limits)?;
         let gaps = times.iter().filter_map(|time| Some(nearest(log, time - seconds)?.1));
         let gap = gaps.filter(|gap| *gap <= 2.0 * most).fold(0.0, f64::max);
-        Some(ClockShift { seconds, gap })
+        Some(ClockShift { seconds, gap, is_of_stops: false })
     })
 }
 
@@ -217,27 +180,6 @@ fn shift_to(
     median(differences.collect())
 }
 
-/// Returns the warning that the arm moved at the times \[s\] of some measured rows, by a log that is
-/// continuous, with the offset of its clock with which the arm rests at all of them; `None` if it
-/// rests at each, or if more rows than not are measured so and no other offset is certain.
-/// `best_shift` returns a shift \[s\] of the log, and its offset in words.
-pub(super) fn moving_arm(
-    (times, rests): (&[f64], &[Rest]),
-    best_shift: impl FnOnce() -> Option<(f64, String)>,
-    location: &Location,
-) -> Option<Warning> {
-    let moving = |shift: f64| {
-        let gaps = times.iter().filter_map(|&time| nearest_rest(rests, time - shift));
-        gaps.filter(|(_, gap)| *gap > PAIR_GAP).count()
-    };
-    let rows = moving(0.0);
-    let shift = if rows > 1 { best_shift() } else { None };
-    let offset = shift.filter(|(shift, _)| moving(*shift) == 0).map(|(_, words)| words);
-    let is_usual = 2 * rows > times.len() && offset.is_none();
-    let kind = WarningKind::MovedAtTime { rows, of: times.len(), offset };
-    (rows > 0 && !is_usual).then(|| Warning { location: location.clone(), kind })
-}
-
 /// Unit of the differences between time zones \[s\].
 const QUARTER_HOUR: f64 = 900.0;
 /// Largest deviation from a whole number of quarter hours that a change of the time zone leaves
@@ -247,7 +189,7 @@ const MAX_OFF_QUARTER: f64 = 2.0;
 /// Returns the whole quarters of an hour \[s\] that must be added to `times` \[s\], those of the
 /// rows without a partner, so that they have partners in `log`. `None` if no such shift is certain.
 fn zone_change(times: &[f64], log: &[f64]) -> Option<f64> {
-    let shift = -best_shift(times, (log, &[]))?.seconds;
+    let shift = -best_shift(times, (log, &Stops::default()))?.seconds;
     let whole = (shift / QUARTER_HOUR).round() * QUARTER_HOUR;
     (whole != 0.0 && (shift - whole).abs() < MAX_OFF_QUARTER).then_some(whole)
 }
@@ -288,18 +230,6 @@ fn pairs(
         let (rest, gap) = nearest_rest(rests, time - shift)?;
         (gap <= most).then_some((time, rest))
     })
-}
-
-/// Returns the index of the rest that is nearest to `time`, and the time between them \[s\]; `None`
-/// without rests, which must be in ascending order.
-fn nearest_rest(rests: &[Rest], time: f64) -> Option<(usize, f64)> {
-    let after = rests.partition_point(|rest| rest.last < time);
-    let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
-    let gap = |place: usize| {
-        let rest = rests.get(place)?;
-        Some((place, (rest.first - time).max(time - rest.last).max(0.0)))
-    };
-    around.filter_map(gap).min_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
 /// Largest number of rows by which positions and configurations are compared as shifted.
@@ -350,7 +280,8 @@ mod tests {
             (0..30).map(|k| f64::from(k * 8) + f64::from(k * k % 31) / 4.0).collect();
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
         let shift = |times: &[f64], log: &[f64]| {
-            best_shift(times, (log, &[])).map_or([f64::NAN; 2], |shift| [shift.seconds, shift.gap])
+            best_shift(times, (log, &Stops::default()))
+                .map_or([f64::NAN; 2], |shift| [shift.seconds, shift.gap])
         };
         let [seconds, gap] = shift(&late, &uneven);
         assert!((seconds - 47.03).abs() < 1e-9 && gap < 1e-9, "{seconds} {gap}");
@@ -368,59 +299,5 @@ mod tests {
         assert_eq!(zone_change(&late, &uneven), Some(-3600.0));
         let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
         assert_eq!(zone_change(&late, &uneven), None);
-    }
-
-    #[test]
-    fn the_clock_of_a_continuous_log_is_found_by_its_rests() {
-        // The arm moves for 8 s, and rests for 7 to 22 s; twice a second a row is logged.
-        let mut rows: Vec<(f64, ByteRecord)> = Vec::new();
-        let (mut time, mut measured) = (1000.0, Vec::new());
-        for pose in 0..40_i32 {
-            let rest = 14 + pose * pose * 7 % 31;
-            for k in 0..16 + rest {
-                let at = 30 * pose - 2 * (16 - k).max(0);
-                rows.push((time, ByteRecord::from(vec![time.to_string(), at.to_string()])));
-                time += 0.5;
-            }
-            measured.push(time - f64::from(rest) / 4.0 + f64::from(pose % 5 - 2) + 3641.7);
-        }
-        let names = ["time", "q1"].map(str::to_owned);
-        let rests = rests(rows.iter().map(|(time, cells)| (*time, cells)), &names, Some(0));
-        assert_eq!(rests.len(), 40);
-        let log: Vec<f64> = rows.iter().map(|(time, _)| *time).collect();
-        let shift = best_shift(&measured, (&log, &rests)).unwrap().seconds;
-        let place = Location::file(std::path::Path::new("problem.toml"));
-        let moved = |shift: f64| {
-            let times: Vec<f64> = measured.iter().map(|time| time - shift).collect();
-            let best = || {
-                let shift = best_shift(&times, (&log, &rests))?.seconds;
-                Some((shift, format!("{shift:.0}")))
-            };
-            moving_arm((&times, &rests), best, &place).map(|warning| warning.kind)
-        };
-        assert_eq!(moved(shift), None);
-        assert!((shift - 3641.7).abs() < 3.0, "{shift}");
-        let later = moved(shift + 3.0);
-        assert!(matches!(
-            later,
-            Some(WarningKind::MovedAtTime { rows: 2.., of: 40, offset: Some(_) })
-        ));
-        // With rows that are measured while the arm moves, no offset makes it rest at all of them.
-        let mut times: Vec<f64> = measured.iter().map(|time| time - shift).collect();
-        for (time, rest) in times.iter_mut().zip(&rests).take(3) {
-            *time = rest.first - 4.0;
-        }
-        let best = || Some((1.0, "1".to_owned()));
-        let kind = moving_arm((&times, &rests), best, &place).map(|warning| warning.kind);
-        assert_eq!(kind, Some(WarningKind::MovedAtTime { rows: 3, of: 40, offset: None }));
-        // One row for each pose is no continuous log.
-        let few = rows.iter().step_by(40).map(|(time, cells)| (*time, cells));
-        assert_eq!(super::rests(few, &names, Some(0)), []);
-        // An arm that moves by 0.005 rad from row to row does not rest.
-        let radians = ["time", "q1_rad"].map(str::to_owned);
-        let cells = |k: i32| vec![k.to_string(), (0.005 * f64::from(k)).to_string()];
-        let slow: Vec<ByteRecord> = (0..200).map(|k| ByteRecord::from(cells(k))).collect();
-        let timed = slow.iter().enumerate().map(|(k, cells)| (k as f64, cells));
-        assert_eq!(super::rests(timed, &radians, Some(0)), []);
     }
 }
