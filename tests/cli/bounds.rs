@@ -41,12 +41,9 @@ fn errors_of_the_instrument_are_named_and_bounded_in_commands() {
         ("tracker-drift = true".into(), "tracker-drift", "declare laws of t at base.x", {
             |[x, y, z], _, t| [x, y, z + 3e-4 * t]
         }),
-        (
-            settling.into(),
-            "tracker-settling",
-            "declare laws of exp(-t/τ)",
-            |[x, y, z], _, t| [x, y, z + 0.5 * (1.0 - (-t / 300.0).exp())],
-        ),
+        (settling.into(), "tracker-settling", "declare laws of exp(-t/τ)", |[x, y, z], _, t| {
+            [x, y, z + 0.5 * (1.0 - (-t / 300.0).exp())]
+        }),
         (shift.into(), "station-shift", "a session of their own", from_700),
         (move_.into(), "station-move", "a session of their own", |[x, y, z], _, t| {
             if t < 700.0 { [x, y, z] } else { [x - 4e-4 * y, y + 4e-4 * x, z + 0.2] }
