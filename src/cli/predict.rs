@@ -66,7 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.warn(&warnings);
     let estimate = arguments.estimate.as_deref();
     let estimate = estimate.map(|file| arguments.trust.read(file)).transpose()?;
-    let trusted = estimate.as_ref().is_none_or(|estimate| estimate.trusted);
+    let trusted = estimate.as_ref().is_none_or(|of| of.trusted);
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");
     }
@@ -92,8 +92,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         _ => (fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?, None),
     };
     let bounds = bounds.as_ref();
-    let measured = prediction.residuals.as_deref().unwrap_or_default();
-    common.hint(common_error(&rows, measured));
+    let residuals = prediction.residuals.as_deref().unwrap_or_default();
+    common.hint(common_error(&rows, residuals));
     let is_position = |row: usize| rows.observation(row).is_position();
     let bounds_suffice = bounds.is_some() && (0..rows.len()).all(is_position);
     let errors = estimate
@@ -109,7 +109,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             .as_ref()
             .map(|residuals| ("residuals.csv", residuals_csv(&problem, &rows, residuals))),
     );
-    let residuals = prediction.residuals.as_deref().unwrap_or_default();
     let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
     // Targets of commands are true positions, of which readings differ by errors of the instrument.
     let read_otherwise = match &estimate {

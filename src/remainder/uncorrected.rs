@@ -103,5 +103,5 @@ pub fn true_positions(
             && (residuals[*row].position + errors[*row]).norm() <= MAX_ROUNDING
     };
     let (rms, largest) = sizes(&errors);
-    Ok((largest > MAX_ROUNDING && every_row.iter().all(|row| is_target(row))).then_some(rms))
+    Ok((largest > MAX_ROUNDING && every_row.iter().all(is_target)).then_some(rms))
 }

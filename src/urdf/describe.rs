@@ -369,8 +369,8 @@ fn view(
     name: Option<&str>,
 ) -> String {
     let on = |tip: usize| tips.get(tip).filter(|_| tips.len() > 1).map(|name| quoted(name));
-    let places = ["\"tool\"", "\"world\""].map(str::to_owned);
-    let [mut camera, mut board] = [0, 1].map(|tip| on(tip).unwrap_or(places[tip].clone()));
+    let place = |tip, place: &str| on(tip).unwrap_or_else(|| quoted(place));
+    let (mut camera, mut board) = (place(0, "tool"), place(1, "world"));
     if is_camera_in_world {
         std::mem::swap(&mut camera, &mut board);
     }

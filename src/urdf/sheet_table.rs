@@ -146,8 +146,9 @@ pub(crate) fn text_of_table(file: &Path) -> Result<SheetTable, InputError> {
             if ["a", "d"].contains(&key) {
                 longest = longest.max(value.abs() * if unit == "mm" { 1.0 } else { 1e3 });
             }
-            if let Some(place) = ["a", "d", "alpha"].iter().position(|of| *of == key) {
-                row[place] = match unit {
+            let place = ["a", "d", "alpha"].iter().position(|of| *of == key);
+            if let Some(number) = place.and_then(|place| row.get_mut(place)) {
+                *number = match unit {
                     "deg" => value.to_radians(),
                     "mm" => value * 1e-3,
                     _ => value,
@@ -260,15 +261,16 @@ fn columns(
             continue;
         }
         if let Some((key, _)) = names.iter().find_map(bounds) {
-            columns.extend(unit.map(|unit| Column { place, key, unit: unit[0] }));
+            columns.extend(unit.map(|unit| Column { place, key, unit: suffix(unit) }));
             continue;
         }
         let mut keys = KEYS.iter().filter(|key| names.iter().any(|word| is_of(word, key)));
         let Some(first) = keys.clone().next() else { continue };
         let (key, unit) = keys
-            .find_map(|key| Some((key.0, unit.filter(|unit| key.2.contains(unit))?[0])))
+            .find_map(|key| Some((key.0, suffix(unit.filter(|unit| key.2.contains(unit))?))))
             .ok_or_else(|| {
-                let write = first.2.map(|unit| format!("{}_{}", first.0, unit[0])).join(" or ");
+                let write =
+                    first.2.map(|unit| format!("{}_{}", first.0, suffix(unit))).join(" or ");
                 at(name).error(if unit.is_some() || is_foreign {
                     let quantity = if first.2 == ANGLES { Unit::Angle } else { Unit::Length };
                     let factor = quantity.convert_foreign(last, 1.0);
@@ -334,6 +336,11 @@ fn constant(text: &str, unit: &str) -> Option<f64> {
     let radians: f64 =
         factor * PI / divisor.filter(|_| text.ends_with(['π']) || text.contains('/'))?;
     Some(if unit == "deg" { radians.to_degrees() } else { radians })
+}
+
+/// Returns the first of the names of a unit, by which keys end.
+fn suffix(names: Names) -> &'static str {
+    names.first().copied().unwrap_or_default()
 }
 
 #[cfg(test)]

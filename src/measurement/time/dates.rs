@@ -107,8 +107,9 @@ pub(crate) fn date_part(text: &str) -> &str {
     /// Largest length of a date \[bytes\].
     const MAX_LENGTH: usize = 40;
     let is_date = |date: &&str| matches!(Date::read(&tokens(date)), Some((_, [])));
-    let dates = (0..text.len().min(MAX_LENGTH)).filter_map(|end| text.get(..end)).filter(is_date);
-    Instant::read(text).and_then(|_| dates.rev().next()).unwrap_or(text)
+    let mut dates =
+        (0..text.len().min(MAX_LENGTH)).filter_map(|end| text.get(..end)).filter(is_date);
+    Instant::read(text).and_then(|_| dates.next_back()).unwrap_or(text)
 }
 
 /// Meaning of the three numbers of a date.
@@ -467,7 +468,7 @@ mod tests {
         };
         for trial in 0..10_000 {
             let mut text: Vec<char> = FORMS[draw(FORMS.len())].chars().collect();
-            for _ in 0..1 + trial % 4 {
+            for _ in 0..=trial % 4 {
                 let place = draw(text.len());
                 match draw(3) {
                     0 => text[place] = pieces[draw(pieces.len())],
