@@ -12,6 +12,9 @@ const THREE_JOINTS: [&str; 2] = [
      temperature_C = [20, 40]\ntime_step_s = 60\n",
 ];
 
+/// Reading of a position \[mm\] at a temperature above the reference \[K\] and a time \[s\].
+type Error = fn([f64; 3], f64, f64) -> [f64; 3];
+
 #[test]
 fn errors_of_the_instrument_are_named_and_bounded_in_commands() {
     let folder = Folder::with([("problem.toml", THREE_JOINTS[0]), ("truth.toml", THREE_JOINTS[1])]);
@@ -24,7 +27,6 @@ fn errors_of_the_instrument_are_named_and_bounded_in_commands() {
     let move_ = "station-move = { at_time_s = 700 }";
     // Each effect with its name on the screen, what to do if the arm moves by it, and how readings
     // err.
-    type Error = fn([f64; 3], f64, f64) -> [f64; 3];
     let along_z: Error = |[x, y, z], kelvin, _| [x, y, z + 0.02 * kelvin];
     let from_700: Error = |[x, y, z], _, t| [x, y, z + if t < 700.0 { 0.0 } else { 0.3 }];
     let cases: [(String, &str, &str, Error); 8] = [

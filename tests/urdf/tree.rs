@@ -99,7 +99,7 @@ fn several_tips_make_one_tree_with_the_joints_of_the_trunk_once() {
 fn a_camera_on_one_branch_sees_a_board_on_another() {
     let robot = torso();
     let chain = |tip: &str| Chain::new(&robot, None, Some(tip)).unwrap();
-    let board = Some(([3, 2], 25.0));
+    let board = Some(([3, 2], 25.0, false));
     let text = describe_measured(&chain("eye"), &[chain("hand")], board).unwrap().text;
     let tree = parse(&text);
     let carriers: Vec<Option<usize>> =
