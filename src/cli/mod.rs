@@ -4,6 +4,7 @@
 
 mod accept;
 mod advice;
+mod camera_advice;
 mod check;
 mod compare;
 mod compare_results;

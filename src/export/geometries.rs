@@ -9,7 +9,7 @@ use crate::fit::{self, ErrorSummary, Options, Placement, SavedEstimate, Strategy
 use crate::measurement::{Dataset, Split};
 use crate::mechanics::Arm;
 use crate::model::Model;
-use crate::problem::{Constraint, Fixture, Joint, ParameterRule, Problem};
+use crate::problem::{Constraint, Fixture, Joint, Observation, ParameterRule, Problem};
 use crate::remainder::Correction;
 
 /// Number of coordinates of a pose, with which the numbers of a camera or marker begin.
@@ -115,7 +115,7 @@ impl Geometry {
     /// bases, cameras and markers. The others are `None` if they are this one, cannot be computed, or
     /// if the whole model is rigid without effects. Bases and tools are those of the whole model where
     /// all rows measure positions. Otherwise, and for the nominal arm, bases, tools, cameras and
-    /// markers are fitted to each geometry; only then is the identified one computed.
+    /// markers are fitted to each geometry. The identified one is computed of images alone.
     ///
     /// # Errors
     /// Returns an error if the estimate does not match the data.
@@ -135,6 +135,7 @@ impl Geometry {
             let fit::Errors { identification, held_out, .. } = alone.fitted;
             if data.split.held_out.is_empty() { identification } else { held_out }
         };
+        let pixel = Observation::Pixel(0, 0, 0).kind();
         let are_positions = poses.iter().all(|pose| pose.observation.is_position());
         let refit = |arm: &Arm<f64>| refitted(problem, (&model, &x), arm, (data, rows));
         let of_arm = |best: &RigidFit| {
@@ -156,7 +157,8 @@ impl Geometry {
             best_rigid(problem, estimate, correction, (&workspace, self.has_room)).ok()
         });
         let alone = self.fitted_alone.is_none().then(|| fit_alone(problem, data).ok());
-        let identified = (!are_positions).then(|| refit(&model.arm(|k| x[k]))).flatten();
+        let is_of_images = poses.iter().all(|pose| pose.observation.kind() == pixel);
+        let identified = is_of_images.then(|| refit(&model.arm(|k| x[k]))).flatten();
         Ok([
             exported,
             best.flatten().as_ref().and_then(of_arm),

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
-use super::guessed_names::shared_name;
+use super::foreign_name::shared_name;
 use super::headerless::{holds_numbers, no_header};
 use super::mapped::{Names, no_such};
 use super::meaning::{

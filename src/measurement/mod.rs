@@ -1,8 +1,7 @@
 //! Measured poses, stored by column in SI units.
 //!
 //! [`Dataset::read`] reads the tables that a problem names, and [`Dataset::builder`] takes arrays.
-//! [`Dataset::poses`] makes rows without measured positions, for predictions. `docs/problem.md`
-//! lists the columns and their units.
+//! [`Dataset::poses`] makes rows without positions. `docs/problem.md` lists columns and units.
 
 #[deny(clippy::indexing_slicing)]
 mod appended;

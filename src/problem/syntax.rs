@@ -287,6 +287,11 @@ fn mistaken_form(
     let has_no_equals = message.contains("key with no value");
     let mistakes = [
         (
+            message.contains("invalid basic string") && message.contains("expected `\"`"),
+            "a quote is opened and not closed",
+            "write \" at the end of the text",
+        ),
+        (
             is_lone_flag || (is_rule && is_value && ["free", "fixed"].contains(&word)),
             "a rule is a table in braces",
             "write { free = true } to free parameters, { fixed = true } to hold them",

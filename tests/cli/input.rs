@@ -244,7 +244,7 @@ fn wrong_arguments_end_with_status_two_and_help_with_zero() {
         ),
         ("problem.toml", "tip: write a command first, as in flexcal identify problem.toml"),
         ("export . --estimate e.json --format URDF", "tip: leave --format out to write a URDF"),
-        ("init .", "it is a folder; give a regular file"),
+        ("init .", "it is a folder; give the URDF of the arm"),
         ("identify . --ouput out", "tip: --out DIR names the folder of the results"),
         ("loop . --solver lm", "tip: loop takes no --solver; it is an option of identify"),
         (
