@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
-use super::foreign_name::shared_name;
 use super::headerless::{holds_numbers, no_header};
 use super::mapped::{Names, no_such};
 use super::meaning::{
@@ -11,6 +10,7 @@ use super::meaning::{
     unit_of, word_of_row,
 };
 use super::role::{POINT, POSITION, Role};
+use super::shared_name::shared_name;
 use super::table::Table;
 use crate::error::{
     InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind, nearest, one_typo,

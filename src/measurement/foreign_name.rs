@@ -1,9 +1,4 @@
-//! Names of joint and position columns as other programs write them, or that mean several joints.
-
-use super::meaning::{Numbering, unit_of};
-use super::table::Table;
-use crate::error::{InputError, Location, TableErrorKind};
-use crate::problem::{Joint, JointSource, Problem};
+//! Names of joint and position columns as other programs write them.
 
 /// Words that other programs write before the number of a joint.
 const JOINT_WORDS: [&str; 12] =
@@ -36,34 +31,6 @@ pub(super) fn guess(name: &str) -> Option<(String, Option<&'static str>)> {
     let axis = ["x", "y", "z"].into_iter().find(|axis| letters.ends_with(axis))?;
     let before = letters.strip_suffix(axis)?;
     POSITION_WORDS.contains(&before).then(|| (axis.to_owned(), unit))
-}
-
-/// Returns the error of an `unknown` column that is named after several joints, one of which is the
-/// joint `index`; `None` if no column is.
-pub(super) fn shared_name(
-    index: usize,
-    (table, problem, numbering): (&Table, &Problem, &Numbering),
-    unknown: &[&str],
-) -> Option<InputError> {
-    let joint = problem.joints.get(index)?;
-    let namesakes: Vec<(usize, &Joint)> =
-        problem.joints.iter().enumerate().filter(|(_, other)| other.name == joint.name).collect();
-    let of_it =
-        |name: &&&str| name.strip_prefix(&joint.name).is_some_and(|rest| rest.starts_with('_'));
-    let column = unknown.iter().find(of_it).filter(|_| namesakes.len() > 1)?;
-    let suffix = if problem.data.joints == JointSource::Read { "_read" } else { "" };
-    let write = namesakes.iter().filter_map(|(index, joint)| {
-        let name = format!("q{}{suffix}", numbering.number(*index));
-        Some(unit_of(joint.command_kind())?.alternatives(&name))
-    });
-    let place = |of: &Location| Location { key: None, ..of.clone() }.to_string();
-    let places = namesakes.iter().map(|(_, joint)| place(&joint.location)).collect();
-    let kind = TableErrorKind::SharedJointName {
-        name: joint.name.clone(),
-        places,
-        write: write.collect(),
-    };
-    Some(table.column(column).error(kind))
 }
 
 #[cfg(test)]

@@ -58,6 +58,7 @@ mod required;
 mod role;
 mod rows;
 mod settled;
+mod shared_name;
 mod spelling;
 mod split;
 mod start_times;
@@ -105,8 +106,7 @@ pub struct Measurements {
     /// Observation of each row; empty if all rows measure positions.
     #[doc(hidden)]
     pub observations: Vec<Observation>,
-    /// Names of the two points of each known distance, in alphabetic order, and the observation of
-    /// its row.
+    /// Names of the two points of each known distance, sorted, and the observation of its row.
     #[doc(hidden)]
     pub distance_names: Vec<(Observation, [String; 2])>,
     /// Measured numbers of each row, padded with zeros: a position in the measuring frame \[m\], a
