@@ -32,8 +32,9 @@ def toml_held_out(held_out: HeldOut) -> str:
             return f'{{ session = "{held_out}" }}'
     elif isinstance(held_out, (int, float)) and not isinstance(held_out, bool) and 0.0 < held_out < 1.0:
         return f"{{ fraction = {float(held_out)!r}, seed = 1 }}"
-    is_percentage = isinstance(held_out, (int, float)) and not isinstance(held_out, bool) and 1 <= held_out < 100
-    hint = f"; write {held_out / 100:g} for {held_out} %" if is_percentage else ""
+    hint = ""
+    if isinstance(held_out, (int, float)) and not isinstance(held_out, bool) and 1 <= held_out < 100:
+        hint = f"; write {held_out / 100:g} for {held_out} %"
     raise InputError(
         f"held_out: {held_out!r} is neither \"none\" nor a fraction between 0 and 1 nor the name of a session{hint}", key="held_out"
     )

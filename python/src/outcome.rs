@@ -13,9 +13,7 @@ use flexcal::nalgebra::{DMatrix, Vector3};
 use flexcal::problem::Problem;
 use flexcal::remainder::{self, Bounds, Correction, Fitted};
 use flexcal::report::{self, PredictionAccuracy, Report};
-use flexcal::results::{
-    Document as _, IdentificationResult, LoopResult, PlotData, TraceResult, exceeds_noise,
-};
+use flexcal::results::{Document as _, IdentificationResult, LoopResult, PlotData, TraceResult};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -235,17 +233,7 @@ impl Identification {
     fn cautions(&self) -> Vec<String> {
         let findings = self.found.findings.iter();
         let warnings = findings.filter(|finding| finding.severity() == Severity::Warning);
-        let misfit = self
-            .found
-            .reduced_chi2
-            .filter(|_| exceeds_noise(&self.found) && self.remainder().is_none());
-        let misfit = misfit.map(|chi2| {
-            format!(
-                "structure remains: the fit misses its rows by more than the declared σ (reduced χ² \
-                 {chi2:.2}), and error bounds do not hold for what the model lacks"
-            )
-        });
-        warnings.map(ToString::to_string).chain(misfit).collect()
+        warnings.map(ToString::to_string).collect()
     }
 
     /// Covariance of all parameters, SI, shape = (parameters, parameters); NaN where one of the two

@@ -45,7 +45,7 @@ const CORRECTED_IN_TABLE: [FindingCode; 4] = [
 /// returns the command that applies the estimate and does what its argument says.
 fn search_or_apply(
     common: &Common,
-    problem: &Problem,
+    (problem, found): (&Problem, &Identification),
     is_partial: bool,
     to_apply: impl Fn(&str) -> String,
 ) -> String {
@@ -59,6 +59,8 @@ fn search_or_apply(
             "flexcal trace {named} ranks candidates for what is left; {}",
             to_apply("applies the estimate with its remainder")
         )
+    } else if is_closed && !found.is_trusted() {
+        format!("flexcal trace {named} ranks candidates for what is left")
     } else if is_closed && !measures_no_position(problem) {
         let apply = to_apply("corrects commands, with the error bound stated");
         format!("{apply}; flexcal trace {named} ranks candidates for what is left")
@@ -93,7 +95,7 @@ pub fn after_fit(
     let as_warned =
         |what: &str| format!("{what} as the warning says, then flexcal identify {named}");
     let correct = || as_warned(&format!("correct the table or {file}"));
-    let search = search_or_apply(common, problem, is_partial, to_apply);
+    let search = search_or_apply(common, (problem, found), is_partial, to_apply);
     match report::influential_rows_advice(found, &common.problem_file()) {
         _ if !found.is_trusted() && CORRECTED_IN_TABLE.iter().any(|code| found.has(*code)) => {
             as_warned("correct the table")

@@ -155,7 +155,8 @@ impl Measurements {
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let name = table.name().to_owned();
         let mut tables = Tables::new(std::slice::from_ref(&name), problem, table_use);
-        let dialect = problem.data.dialect.in_memory();
+        let dialect =
+            problem.data.dialect.in_memory(matches!(table_use, Use::Measured | Use::Judged));
         tables.read(0, Table::from_reader(&name, &dialect, Box::new(table.into_text()))?)?;
         tables.finish()
     }

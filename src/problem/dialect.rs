@@ -26,15 +26,16 @@ pub struct Dialect {
 }
 
 impl Dialect {
-    /// Returns the dialect for a table in memory, which has neither delimiters nor comments. NaN,
-    /// by which data frames mark what is missing, marks a row without a measurement unless the
-    /// problem names another mark.
-    pub(crate) fn in_memory(&self) -> Self {
+    /// Returns the dialect for a table in memory, which has neither delimiters nor comments. If its
+    /// rows are `measured`, NaN, by which data frames mark what is missing, marks a row without a
+    /// measurement unless the problem names another mark.
+    pub(crate) fn in_memory(&self, measured: bool) -> Self {
+        let not_a_number = || measured.then(|| Missing::Word("NaN".to_owned()));
         Self {
             delimiter: Some(Delimiter::Byte(b',')),
             decimal_comma: false,
             comment: None,
-            missing: self.missing.clone().or_else(|| Some(Missing::Word("NaN".to_owned()))),
+            missing: self.missing.clone().or_else(not_a_number),
             ..self.clone()
         }
     }

@@ -239,7 +239,7 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
              = 360",
         ),
         (
-            is_number(value),
+            is_number(value) && format!("x = {value}").parse::<toml::Table>().is_err(),
             "a number as TOML does not have it",
             "write a digit before and behind the point, and no 0 before other digits, as in 0.42, \
              1.0 and 7",

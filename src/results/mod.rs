@@ -57,9 +57,7 @@ pub(crate) use plots::{
     sample,
 };
 pub(crate) use remainder::REMAINDER_FILE;
-pub(crate) use residual_test::ResidualSize;
-#[doc(hidden)]
-pub use residual_test::exceeds_noise;
+pub(crate) use residual_test::{ResidualSize, exceeds_noise};
 pub(crate) use study::Cell;
 pub(crate) use summary::{Summary, measured_kinds, nominal_arm, registered_parts, rows_in};
 pub(crate) use tables::{

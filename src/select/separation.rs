@@ -21,6 +21,7 @@ pub struct Separation {
     /// parameters projected out: 0 if they are equal, π/2 if they are orthogonal. `None` if one of
     /// them has no effect.
     pub angle: Option<f64>,
+    is_alike: bool,
     /// Detectability of the first effect given the second, and of the second given the first.
     pub sides: [Side; 2],
 }
@@ -28,7 +29,7 @@ pub struct Separation {
 impl Separation {
     /// Returns true if the poses do not distinguish the effects at all.
     pub fn is_alike(&self) -> bool {
-        self.angle.is_some_and(|angle| angle < MAX_ALIKE_ANGLE)
+        self.is_alike
     }
 }
 
@@ -92,19 +93,21 @@ pub fn separation(
                 ),
             }
         };
-        let angle = linear.angle(&linearised.columns(one), &linearised.columns(other));
-        Separation { angle, sides: [side(one, other), side(other, one)] }
+        let columns = [one, other].map(|effect| linearised.columns(effect));
+        let angle = linear.angle(&columns[0], &columns[1]);
+        let is_alike = linear.are_alike(&columns[0], &columns[1], MAX_ALIKE_ANGLE);
+        Separation { angle, is_alike, sides: [side(one, other), side(other, one)] }
     })
 }
 
 /// Returns true if none of `poses` distinguishes two effects that the problem does not declare: for
 /// this arm, they are one cause with two names.
 pub(super) fn are_alike(problem: &Problem, poses: &Measurements, pair: &[Effect; 2]) -> bool {
-    let angle = with_linear(problem, &with_assumed_times(poses), pair, |linearised, linear| {
+    let are_alike = with_linear(problem, &with_assumed_times(poses), pair, |linearised, linear| {
         let [one, other] = pair.each_ref().map(|effect| linearised.columns(effect));
-        linear.angle(&one, &other)
+        linear.are_alike(&one, &other, MAX_ALIKE_ANGLE)
     });
-    angle.is_ok_and(|angle| angle.is_some_and(|angle| angle < MAX_ALIKE_ANGLE))
+    are_alike.unwrap_or(false)
 }
 
 /// Returns the first of an effect's sizes, that for the unit of its first parameter; an empty one

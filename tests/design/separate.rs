@@ -199,6 +199,10 @@ fn one_cause_with_two_names_is_not_planned_for() {
     let two = pair(&problem, names).unwrap();
     let [one, other] = &two.effects;
     assert!(separation(&two.plain, &poses, [one, other]).unwrap().is_alike());
+    // A scale is a special case of a strain, whose other entries the poses show.
+    let nested = pair(&problem, ["tracker-scale = true", "frame-strain = true"]).unwrap();
+    let [one, other] = &nested.effects;
+    assert!(!separation(&nested.plain, &poses, [one, other]).unwrap().is_alike());
     let options = PlanOptions {
         poses: 8,
         criterion: &Criterion::S,

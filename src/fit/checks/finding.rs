@@ -64,17 +64,13 @@ pub(in crate::fit) const RESERVATIONS: [FindingCode; 6] = [
     FindingCode::SetUpUndecided,
 ];
 
-/// Codes of findings by which held-out rows contradict the error bounds of predictions.
-const AGAINST_BOUNDS: [FindingCode; 2] =
-    [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutOutliers];
-
 /// States that held-out rows contradict the error bounds of predictions; `None` if they do not.
 /// `findings` has code and text of each finding.
 pub(in crate::fit) fn doubted_bounds<'a>(
     mut findings: impl Iterator<Item = (&'a str, &'a str)>,
 ) -> Option<String> {
-    let is_against =
-        |(code, _): &(&str, &str)| AGAINST_BOUNDS.iter().any(|of| of.entry().code == *code);
+    let against = FindingCode::HeldOutBeyondPrediction.entry().code;
+    let is_against = |(code, _): &(&str, &str)| *code == against;
     let (_, text) = findings.find(is_against)?;
     Some(format!("the error bounds may be too small, for held-out rows contradict them: {text}"))
 }

@@ -63,6 +63,7 @@ fn brackets_lists_and_bare_words_are_named() {
         ("[data]\nheld_out = { fraction: 0.3 }", &["a colon in place of =; write key = value"]),
         ("a_m: 0.3", &["a colon in place of =; write key = value"]),
         ("[data]\nfiles = 'a.csv', 'b.csv'", &["write a list in brackets"]),
+        ("a_m = 0.1, 0.2", &["several values or keys on one line"]),
         ("[data.columns]\nX [mm] = 'x_mm'", &["a key with a space"]),
         ("name = \"elbow", &["a quote is opened and not closed"]),
         ("[[effect]]\nbacklash = { joint 1 }", &["a key without =; write key = value"]),
