@@ -372,8 +372,7 @@ impl LinearNeighbourhood {
         cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
 
-    /// Returns true if two sets of columns add the same directions to the fit, within an angle of
-    /// `limit` \[rad\]. A set that adds more directions than the other one is not the same.
+    /// Returns true if two sets of columns add as many directions to the fit, within `limit` \[rad\].
     pub fn are_alike(&self, one: &DMatrix<f64>, other: &DMatrix<f64>, limit: f64) -> bool {
         let ranks = [one, other].map(|columns| self.directions(columns).1.ncols());
         ranks[0] == ranks[1] && self.angle(one, other).is_some_and(|angle| angle < limit)
