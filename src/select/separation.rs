@@ -1,8 +1,10 @@
 //! Distinction of two effects by poses that are not measured yet.
 
+use nalgebra::DMatrix;
+
 use super::candidates::Candidates;
 use super::detection::{Size, candidates, sizes, with_assumed_times, with_linear};
-use super::neighbourhood::tries;
+use super::neighbourhood::{LinearNeighbourhood, tries};
 use super::power::ScanTest;
 use super::rules::SelectionRules;
 use crate::error::InputError;
@@ -95,7 +97,7 @@ pub fn separation(
         };
         let columns = [one, other].map(|effect| linearised.columns(effect));
         let angle = linear.angle(&columns[0], &columns[1]);
-        let is_alike = linear.are_alike(&columns[0], &columns[1], MAX_ALIKE_ANGLE);
+        let is_alike = add_the_same(linear, [&columns[0], &columns[1]]);
         Separation { angle, is_alike, sides: [side(one, other), side(other, one)] }
     })
 }
@@ -105,9 +107,16 @@ pub fn separation(
 pub(super) fn are_alike(problem: &Problem, poses: &Measurements, pair: &[Effect; 2]) -> bool {
     let are_alike = with_linear(problem, &with_assumed_times(poses), pair, |linearised, linear| {
         let [one, other] = pair.each_ref().map(|effect| linearised.columns(effect));
-        linear.are_alike(&one, &other, MAX_ALIKE_ANGLE)
+        add_the_same(linear, [&one, &other])
     });
     are_alike.unwrap_or(false)
+}
+
+/// Returns true if two sets of columns add the same directions to a fit. A set that adds more
+/// directions than the other one is not the same.
+fn add_the_same(linear: &LinearNeighbourhood, [one, other]: [&DMatrix<f64>; 2]) -> bool {
+    let [rank, other_rank] = [one, other].map(|columns| linear.score(columns).rank());
+    rank == other_rank && linear.angle(one, other).is_some_and(|angle| angle < MAX_ALIKE_ANGLE)
 }
 
 /// Returns the first of an effect's sizes, that for the unit of its first parameter; an empty one

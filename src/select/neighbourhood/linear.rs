@@ -371,12 +371,6 @@ impl LinearNeighbourhood {
         let cosines = a.tr_mul(&b).singular_values();
         cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
-
-    /// Returns true if two sets of columns add as many directions to the fit, within `limit` \[rad\].
-    pub fn are_alike(&self, one: &DMatrix<f64>, other: &DMatrix<f64>, limit: f64) -> bool {
-        let ranks = [one, other].map(|columns| self.directions(columns).1.ncols());
-        ranks[0] == ranks[1] && self.angle(one, other).is_some_and(|angle| angle < limit)
-    }
 }
 
 /// Returns true if a projection leaves at least [`MIN_PART_OF_ONE_PROJECTION`] of the length of
