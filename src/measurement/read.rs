@@ -138,7 +138,8 @@ impl Measurements {
                 let named = InputErrorKind::DataFileMissing { path: file.clone() };
                 file_error((file, files), problem, [named, InputErrorKind::GivenFileMissing])
             };
-            tables.read(index, Table::open(file, &problem.data.dialect, missing)?)?;
+            let dialect = &problem.data.dialect;
+            tables.read(index, Table::open(file, dialect, missing)?, dialect)?;
             if table_use == Use::Planned && was_changed(file) {
                 let (location, kind) = (Location::file(file), WarningKind::FileChanged);
                 tables.warnings.push(Warning { location, kind });
@@ -157,7 +158,8 @@ impl Measurements {
         let mut tables = Tables::new(std::slice::from_ref(&name), problem, table_use);
         let dialect =
             problem.data.dialect.in_memory(matches!(table_use, Use::Measured | Use::Judged));
-        tables.read(0, Table::from_reader(&name, &dialect, Box::new(table.into_text()))?)?;
+        let table = Table::from_reader(&name, &dialect, Box::new(table.into_text()))?;
+        tables.read(0, table, &dialect)?;
         tables.finish()
     }
 }
@@ -218,9 +220,13 @@ impl<'a> Tables<'a> {
         }
     }
 
-    /// Reads all rows of a table; `index` is the number of its file.
-    fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
-        let dialect = &self.problem.data.dialect;
+    /// Reads all rows of a table in its dialect; `index` is the number of its file.
+    fn read(
+        &mut self,
+        index: usize,
+        mut table: Table,
+        dialect: &Dialect,
+    ) -> Result<(), InputError> {
         let joint_log = self.problem.data.joint_log.as_ref();
         if joint_log.is_some() {
             table.find_decimal_mark();
@@ -254,7 +260,7 @@ impl<'a> Tables<'a> {
             &mut ignored,
         )
         .map_err(|error| match joint_log.filter(|_| self.joins && !is_joined) {
-            Some(declared) => of_exchanged_tables(error, declared, dialect),
+            Some(declared) => of_exchanged_tables(error, declared, &self.problem.data.dialect),
             None => error,
         })?;
         observed::check_target_column(&table, &columns, self.problem)?;
