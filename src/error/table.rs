@@ -26,7 +26,7 @@ pub enum TableErrorKind {
     #[error("{} is named twice; its rows would count twice", path.display())]
     RepeatedFile { path: PathBuf },
     #[error(
-        "several joints are called \"{name}\" ({}); give each its own name, or write {}",
+        "several joints are called \"{name}\" ({}); give each a different name, or write {}",
         places.join(", "), write.join(" and ")
     )]
     SharedJointName { name: String, places: Vec<String>, write: Vec<String> },
@@ -35,7 +35,7 @@ pub enum TableErrorKind {
     #[error("the file is empty; it begins with a header line such as q1_deg,x_mm,y_mm,z_mm")]
     EmptyTable,
     #[error(
-        "the pose {name} is already on line {line}; give each pose of the joint table its own name"
+        "the pose {name} is already on line {line}; name each pose of the joint table differently"
     )]
     RepeatedPose { name: String, line: usize },
     #[error(

@@ -369,9 +369,10 @@ impl Extended {
             .collect();
         let mut merged: Vec<(usize, usize)> = Vec::new();
         for (held, cause) in causes.iter().enumerate().filter(|(_, cause)| self.is_held(cause)) {
-            let own = ColumnSpace::new(rows, &cause.columns);
+            let held_space = ColumnSpace::new(rows, &cause.columns);
             let is_twin = |space: &ColumnSpace| {
-                space.basis.ncols() == own.basis.ncols() && space.contains(rows, &cause.columns)
+                space.basis.ncols() == held_space.basis.ncols()
+                    && space.contains(rows, &cause.columns)
             };
             let twin = spaces.iter().find(|(_, space)| is_twin(space));
             merged.extend(twin.map(|(place, _)| (held, *place)));

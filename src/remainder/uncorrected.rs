@@ -61,11 +61,11 @@ pub(super) fn uncorrected(
     let mut poses = placement.poses(targets, &every_row, 1.0);
     estimate.count_time_in(&placement, &mut poses);
     let of_effect = |effect: &Effect| {
-        let own = effect.parameters(problem);
-        let is_own = |name: &str| own.iter().any(|parameter| parameter.name == name);
+        let parameters = effect.parameters(problem);
+        let is_of_effect = |name: &str| parameters.iter().any(|parameter| parameter.name == name);
         let parameters = model.parameters.iter().zip(x);
         let alone: Vec<f64> = parameters
-            .map(|(parameter, x)| if is_own(&parameter.name) { *x } else { 0.0 })
+            .map(|(parameter, x)| if is_of_effect(&parameter.name) { *x } else { 0.0 })
             .collect();
         let differences = model.reading_errors(&alone, &poses, &targets.positions);
         let acts = differences.iter().any(|difference| difference.norm() > 0.0);

@@ -106,11 +106,12 @@ fn a_table_in_memory_is_read_as_the_file_is() {
         (&memory.time, &memory.approach, &memory.origin),
         (&file.time, &file.approach, &file.origin)
     );
-    let replaced = |name: &str, values: ColumnValues| {
+    let with = |name: &str, values: ColumnValues| {
         let mut columns = in_memory();
         columns.iter_mut().find(|(column, _)| column == name).unwrap().1 = values;
-        read(columns).unwrap_err().to_string()
+        read(columns)
     };
+    let replaced = |name: &str, values| with(name, values).unwrap_err().to_string();
     let numbers = |row: usize, value: f64| {
         let mut numbers = vec![0.5; 78];
         numbers[row] = value;
@@ -119,8 +120,12 @@ fn a_table_in_memory_is_read_as_the_file_is() {
     let words = |row: usize, word| {
         ColumnValues::Words((0..78).map(|k| if k == row { word } else { "1" }).collect())
     };
+    // A row without a measured position is left out.
+    let (gap, warnings) = with("x_mm", numbers(5, f64::NAN)).unwrap();
+    assert_eq!(gap.measurements.len() + 1, memory.len());
+    assert!(warnings[0].to_string().starts_with("memory:7: 1 row without a measurement"));
     let told = [
-        (replaced("x_mm", numbers(5, f64::NAN)), "memory:7: column x_mm: \"NaN\" is not a number"),
+        (replaced("q1_deg", numbers(5, f64::NAN)), "memory:7: column q1_deg: NaN is not a finite"),
         (replaced("x_mm", numbers(77, 1e200)), "memory:79: column x_mm: 1e200 is larger than"),
         (replaced("x_mm", words(0, "a,\"b")), "memory:2: column x_mm: \"a,\"b\" is not a number"),
         (replaced("split", words(1, "")), "memory:2: column split: \"1\" is neither"),

@@ -197,7 +197,7 @@ impl<'a> CheckedFit<'a> {
         let Fitting { placement, measurements, split, .. } = *self.fitting;
         let declared = Model::new(problem, &placement.bases, &placement.targets).ok()?;
         let model = &strategy.model(declared);
-        // The other model needs a cache of its own, because its linearisations differ.
+        // The other model needs a new cache, because its linearisations differ.
         let cache = &LinearisationCache::default();
         Some(result(&Fitting {
             model,

@@ -397,7 +397,7 @@ impl<'a> Trial<'a> {
             }
             None => model,
         };
-        // The corrected model needs a cache of its own, because its linearisations differ.
+        // The corrected model needs a new cache, because its linearisations differ.
         let cache = &LinearisationCache::default();
         let fitting = Fitting {
             model,
