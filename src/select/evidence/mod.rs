@@ -182,7 +182,7 @@ fn evaluate_without<'a>(
     let mut explanations: Vec<HypothesisSet> = Vec::new();
     let (mut evaluated_sets, unlisted, mut cache) = {
         let products = Products::new(&blocks, &residual_model);
-        let evaluated_sets = search(&products, &present);
+        let evaluated_sets = search(&products, &present, &[]);
         if data.stop.is_requested() {
             return None;
         }
@@ -204,14 +204,14 @@ fn evaluate_without<'a>(
     };
     let blocks_of =
         |some: &[Candidate]| Candidate::blocks(some, (fitted, &residual_model.fit), left_out);
-    let search_again = |cache: CachedProducts, blocks: &[Block]| {
+    let search_again = |cache: CachedProducts, blocks: &[Block], earlier: &[EvaluatedSet]| {
         let products = Products::with_cache(cache, blocks, &residual_model);
-        (search(&products, &present), products.into_cache())
+        (search(&products, &present, earlier), products.into_cache())
     };
     if !unlisted.is_empty() {
         blocks.extend(blocks_of(&unlisted));
         hypotheses.candidates.extend(unlisted);
-        (evaluated_sets, cache) = search_again(cache, &blocks);
+        (evaluated_sets, cache) = search_again(cache, &blocks, &evaluated_sets);
     }
     let products = Products::with_cache(cache, &blocks, &residual_model);
     let finer = finer::finer_candidates(
@@ -225,7 +225,7 @@ fn evaluate_without<'a>(
     if !finer.is_empty() {
         blocks.extend(blocks_of(&finer));
         hypotheses.candidates.extend(finer);
-        (evaluated_sets, cache) = search_again(cache, &blocks);
+        (evaluated_sets, cache) = search_again(cache, &blocks, &evaluated_sets);
     }
     let of = |k: usize| &hypotheses.candidates[k].hypothesis;
     if data.stop.is_requested() {

@@ -92,7 +92,8 @@ impl<'a> Reevaluation<'a> {
             probability,
             functions: members.iter().map(|&k| candidates[k].variant).zip(sizes).collect(),
         };
-        let sets = search(&Products::new(&blocks, &residual_model), &present).into_iter().map(set);
+        let sets =
+            search(&Products::new(&blocks, &residual_model), &present, &[]).into_iter().map(set);
         Some(Evidence {
             sets: sets.collect(),
             stand_ins: Vec::new(),

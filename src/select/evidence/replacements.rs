@@ -215,7 +215,7 @@ mod tests {
             alike: 0.0,
             stop: Stop::default(),
         };
-        let found = search(&Products::new(&blocks, &residual_model), &[]);
+        let found = search(&Products::new(&blocks, &residual_model), &[], &[]);
         assert_eq!(sorted(&found[0].members), [20, 21], "{:?}", found[0]);
     }
 }

@@ -37,8 +37,14 @@ impl EvaluatedSet {
 /// empty set stands for noise alone.
 ///
 /// The search starts from the empty set, from the set `present`, and from `present` without each of
-/// its members. If a stop is requested, only some sets are evaluated.
-pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet> {
+/// its members. The most probable sets that an `earlier` search found among fewer hypotheses are
+/// evaluated too, because among many similar hypotheses the search may not reach them again. If a
+/// stop is requested, only some sets are evaluated.
+pub(super) fn search(
+    products: &Products,
+    present: &[usize],
+    earlier: &[EvaluatedSet],
+) -> Vec<EvaluatedSet> {
     let Products { blocks, .. } = *products;
     let mut evaluated: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
     let without = |k: usize| [&present[..k], &present[k + 1..]].concat();
@@ -99,6 +105,17 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet
         evaluated.extend(front.iter().map(|set| (set.key(), set.clone())));
         if front.first().is_none_or(|best| best.ln_posterior < best_known - LOG_ODDS_CUTOFF) {
             break;
+        }
+    }
+    let again: Vec<Set> = earlier
+        .par_iter()
+        .take(MAX_SETTLED_SETS)
+        .filter_map(|set| assembled(&set.members, products))
+        .collect();
+    for set in again {
+        let entry = evaluated.entry(set.key()).or_insert_with(|| set.clone());
+        if set.exceeds(entry) {
+            *entry = set;
         }
     }
     add_replacements(&mut evaluated, products);
@@ -259,19 +276,50 @@ mod tests {
             alike: 0.0,
             stop: Stop::default(),
         };
-        let found = search(&Products::new(&blocks, &residual_model), &[]);
+        let found = search(&Products::new(&blocks, &residual_model), &[], &[]);
         assert_eq!(sorted(&found[0].members), [1, 2], "{found:?}");
         assert!(found[0].probability > 0.9, "{}", found[0].probability);
+    }
+
+    #[test]
+    fn a_set_found_among_fewer_hypotheses_is_found_among_many_similar_ones() {
+        let (one, other, noise) = (matrix(90, 1, 3.0), matrix(90, 1, 11.0), matrix(90, 1, 99.0));
+        let residual = (&one * 20.0 + &other * 20.0 + noise).column(0).into_owned();
+        let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
+        let fit = LinearNeighbourhood::new(&matrix(90, 1, 55.0), &residual, &unknowns, 0);
+        let block = |columns: &DMatrix<f64>, ln_prior: f64| {
+            let design = Design::Dense(columns.clone()).scaled(30).unwrap();
+            let mut block = Block::new(design, &fit, ln_prior, Coefficients::default());
+            block.family = Some(String::new());
+            block
+        };
+        let similar = |k: u32| &one + &other + matrix(90, 1, 200.0 + f64::from(k)) * 0.02;
+        let blocks: Vec<Block> = [block(&one, -5.0), block(&other, -5.0)]
+            .into_iter()
+            .chain((0..200).map(|k| block(&similar(k), -20.0)))
+            .collect();
+        let residual_model = ResidualModel {
+            fit: fit.clone(),
+            noise: Noise { freedom: 89.0, ln_half_width: 0.1, min_ln_factor: 0.0 },
+            alike: 0.0,
+            stop: Stop::default(),
+        };
+        let found = search(&Products::new(&blocks[..2], &residual_model), &[], &[]);
+        assert_eq!(sorted(&found[0].members), [0, 1], "{found:?}");
+        let anew = search(&Products::new(&blocks, &residual_model), &[], &[]);
+        assert_ne!(sorted(&anew[0].members), [0, 1], "reached from the empty set");
+        let again = search(&Products::new(&blocks, &residual_model), &[], &found);
+        assert_eq!(sorted(&again[0].members), [0, 1]);
     }
 
     #[test]
     fn what_was_worked_out_before_further_hypotheses_came_changes_nothing() {
         let (blocks, residual_model) = three([2, 0, 1]);
         let fewer = Products::new(&blocks[..2], &residual_model);
-        assert!(!search(&fewer, &[0]).is_empty());
+        assert!(!search(&fewer, &[0], &[]).is_empty());
         let again =
-            search(&Products::with_cache(fewer.into_cache(), &blocks, &residual_model), &[0]);
-        let anew = search(&Products::new(&blocks, &residual_model), &[0]);
+            search(&Products::with_cache(fewer.into_cache(), &blocks, &residual_model), &[0], &[]);
+        let anew = search(&Products::new(&blocks, &residual_model), &[0], &[]);
         assert_eq!(again.len(), anew.len());
         for (set, other) in again.iter().zip(&anew) {
             assert_eq!(set.members, other.members);
