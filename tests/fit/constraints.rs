@@ -3,11 +3,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::arms;
+use crate::common::arms::{self, parse};
 use crate::common::bounded::Bounded;
+use crate::common::made::fit;
+use crate::judged::text;
+use crate::trusted::simulated;
 use argmin::core::observers::Observe;
 use flexcal::fit::{
-    Estimate, Identification, IdentifyError, Options, SolverChoice, StageError, Strategy, identify,
+    Estimate, FindingCode, Identification, IdentifyError, Options, SolverChoice, StageError,
+    Strategy, identify,
 };
 use flexcal::least_squares::solver::{
     BoundMethod, Settings, Solution, State, minimise_constrained_by,
@@ -321,5 +325,26 @@ fn the_service_arm_shows_which_limit_is_wrong() {
     let printed = estimate_text(&problem, &found, Some(accuracy));
     for line in block.split("```").next().unwrap().lines() {
         assert!(printed.contains(line), "{line}");
+    }
+}
+
+#[test]
+fn a_constraint_on_what_the_data_do_not_tell_gives_no_certainty() {
+    // Axes 2 and 3 are parallel: only joint2.d + joint3.d moves the target. By the priors alone the
+    // difference would lie 0.05 mm beyond the limit.
+    let parameters = "'joint2.d' = { sigma_mm = 1 }\n'joint3.d' = { sigma_mm = 1 }";
+    let terms = "terms = { 'joint2.d' = 1.0, 'joint3.d' = -1.0 }";
+    let problem =
+        parse(&format!("{}\n[[constraint]]\n{terms}\nat_least_mm = 0.05\n", text(parameters)));
+    let truth = [("joint2.d", 1.3e-3), ("joint3.d", -0.9e-3)];
+    let found = fit(&problem, &simulated(&problem, &truth, [60, 30], 1));
+    let finding = found.finding(FindingCode::BoundInUnidentifiedDirection).unwrap();
+    assert!(finding.to_string().contains("joint2.d − joint3.d ≥"), "{finding}");
+    for (name, expected) in truth {
+        let of = found.estimate(name).unwrap();
+        let (error, sigma) = (of.estimate - of.nominal - expected, of.std_error.unwrap());
+        // Half a normal distribution of 1 σ = √2 mm from the limit on, shared by both lengths.
+        assert!((sigma / 0.7e-3 - 1.0).abs() < 0.15, "{name}: {sigma}");
+        assert!(error.abs() < 3.0 * sigma && of.identified < 0.7, "{name}: {error} {of:?}");
     }
 }

@@ -292,8 +292,8 @@ finding_codes! {
         "turn the tool by 30° and more about two axes that are not parallel, or hold or declare \
          these coordinates";
     BoundInUnidentifiedDirection: Warning "bound-in-unidentified-direction" ["parameter", "bound", "deviation", "partners"]
-        "A parameter rests on a bound along a direction that the data hardly see, and others \
-         follow it.",
+        "A fit rests on a bound or constraint along a direction that the data hardly see, and \
+         parameters follow it.",
         "fix one of these parameters, or give them priors";
     LimitContradicted: Warning "limit-contradicted" ["limits", "before", "after"]
         "Bounds or constraints cause most of a misfit that contradicts the declared σ: without \

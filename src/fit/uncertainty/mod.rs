@@ -3,7 +3,7 @@
 
 pub(super) mod active_constraint;
 pub(super) mod covariance;
-pub(super) mod hidden_by_bound;
+pub(super) mod hidden_by_limit;
 mod left_out;
 pub(super) mod noise;
 pub(super) mod prices;

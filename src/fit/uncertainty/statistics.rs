@@ -7,7 +7,7 @@ use crate::fit::stages::active_limits::{ActiveLimit, confine};
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::{MAX_CHANCE_PROBABILITY, NoiseModel};
 use crate::fit::stages::stage::{Stage, StageError};
-use crate::fit::uncertainty::hidden_by_bound::{HiddenByBound, hidden_by_bounds};
+use crate::fit::uncertainty::hidden_by_limit::{HiddenByLimit, hidden_by_limits};
 use crate::fit::uncertainty::prices::Prices;
 use crate::fit::uncertainty::residual_lengths::Lengths;
 use crate::least_squares::{Loss, Uncertainty, UnidentifiableSpace};
@@ -41,8 +41,8 @@ pub(in crate::fit) struct Statistics {
     pub constraints: Vec<ActiveLimit>,
     /// Shadow prices of the bounds and constraints on which the fit rests.
     pub prices: Prices,
-    /// Bounds that hide the uncertainty of other unknowns.
-    pub hidden: Vec<HiddenByBound>,
+    /// Limits that hide the uncertainty of unknowns.
+    pub hidden: Vec<HiddenByLimit>,
     /// Lengths of the whitened residuals of the poses, with their scatter.
     pub lengths: Lengths,
 }
@@ -111,18 +111,16 @@ impl Statistics {
         }
         let freedom = freedom - left_out;
         let prices = stage.prices(&end.x, &end.at_bound, &constraints)?;
-        let multipliers: Vec<Option<f64>> =
-            prices.bounds.iter().map(|price| price.map(|price| price.multiplier)).collect();
         let bounded_errors = uncertainty.standard_errors();
         let hidden = if stage.cache.is_provisional() {
             Vec::new()
         } else {
-            hidden_by_bounds(
+            hidden_by_limits(
                 stage,
-                &end.x,
-                (&triangle, &closed),
-                (&held, &end.at_bound),
-                &multipliers,
+                end,
+                &triangle,
+                (&closed, &held),
+                (&constraints, &prices),
                 &bounded_errors,
             )
         };
@@ -132,7 +130,7 @@ impl Statistics {
         }
         let errors = uncertainty.standard_errors();
         let is_open = |j: usize| {
-            let has = |valley: &HiddenByBound| valley.partners.contains(&j);
+            let has = |valley: &HiddenByLimit| valley.partners.contains(&j);
             hidden.iter().any(|valley| has(valley) && valley.deviation.is_infinite())
         };
         // Provisional fits do not compute identified shares.
