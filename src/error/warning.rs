@@ -25,6 +25,16 @@ pub enum WarningKind {
     )]
     ColumnsIgnored { names: Vec<String>, more: usize },
     #[error(
+        "the row of {missing} seems to be missing before {before}: the arm is taken to have {joints} \
+         joints; add it, or number the rows without a gap"
+    )]
+    JointLeftOut { missing: String, before: String, joints: usize },
+    #[error(
+        "no positions are read, though unknown columns seem to be x, y and z: to read them, write \
+         {map} in {section}"
+    )]
+    PositionsNotRead { section: &'static str, map: String },
+    #[error(
         "no column of {} has a name of [data.columns]; the table is read by flexcal's names",
         file.display()
     )]
@@ -408,6 +418,7 @@ impl WarningKind {
         matches!(
             self,
             Self::Kelvins { .. }
+                | Self::PositionsNotRead { .. }
                 | Self::Fahrenheit { .. }
                 | Self::FewDegrees { .. }
                 | Self::ManyTurns { .. }

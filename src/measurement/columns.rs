@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
+use super::foreign_name::guess;
 use super::headerless::{holds_numbers, no_header};
 use super::mapped::{Names, no_such};
 use super::meaning::{
@@ -168,7 +169,7 @@ impl Columns {
             warnings.push(Warning { location: table.column("miss_mm"), kind });
         }
         if let (Some(HeldOut::Fraction { .. }), true) =
-            (&problem.data.held_out, measured && columns.has_split())
+            (&problem.data.held_out, measured && columns.has(Role::Split))
         {
             let (location, kind) = (table.column("split"), WarningKind::SplitUnused);
             warnings.push(Warning { location, kind });
@@ -186,6 +187,9 @@ impl Columns {
         if let Some(rule) = named.unused.filter(|_| measured) {
             let kind = WarningKind::MapUnused { file: table.file.clone() };
             warnings.push(Warning { location: rule.location.clone(), kind });
+        }
+        if !measured {
+            warnings.extend(columns.unread_positions(table, problem, &unknown)?);
         }
         let required = columns.require(table, problem, measured, &numbering, &unknown);
         required.map_err(|error| match (hidden, named.unused) {
@@ -226,7 +230,6 @@ impl Columns {
         unknown: &[&str],
     ) -> Result<(), InputError> {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
-        let strangers = || self.of_numbers(unknown, table);
         let missing = |bases: &[&str], unit: Unit| {
             if let Some(error) =
                 bases.iter().find_map(|base| self.in_foreign_unit(table, base, unit))
@@ -235,10 +238,14 @@ impl Columns {
             }
             let write =
                 bases.iter().map(|base| unit.alternatives(base)).collect::<Vec<_>>().join(" or ");
-            let near =
-                bases.iter().flat_map(|base| unit.spellings(base)).find_map(|name| near(&name));
+            let mut spellings = bases.iter().flat_map(|base| unit.spellings(base));
+            let near = spellings.find_map(|name| near(&name));
             let first = bases.first().copied().unwrap_or_default();
-            let kind = TableErrorKind::MissingColumn { write, near, unknown: strangers() };
+            let kind = TableErrorKind::MissingColumn {
+                write,
+                near,
+                unknown: self.of_numbers(unknown, table),
+            };
             Err(table.column(first).error(kind))
         };
         let (source, suffix): (fn(usize) -> Role, _) = match problem.data.joints {
@@ -335,7 +342,9 @@ impl Columns {
         unit: Unit,
     ) -> Option<InputError> {
         let of_base = |name: &String| {
-            let suffix = name.strip_prefix(base)?.strip_prefix('_')?;
+            let suffix = name.strip_prefix(base).and_then(|rest| rest.strip_prefix('_'));
+            let guessed = || guess(name).filter(|(guessed, _)| guessed == base)?.1;
+            let suffix = suffix.or_else(guessed).filter(|suffix| unit.suffix(suffix).is_none())?;
             Some((suffix.to_owned(), unit.convert_foreign(suffix, 1.0)?))
         };
         let (name, (suffix, factor)) =
@@ -426,11 +435,6 @@ impl Columns {
         let is_complete =
             |count: usize, role: fn(usize) -> Role| (0..count).all(|axis| self.has(role(axis)));
         (is_complete(3, Role::Orientation), is_complete(4, Role::Quaternion))
-    }
-
-    /// Returns true if there is a column `split`.
-    fn has_split(&self) -> bool {
-        self.read.iter().any(|column| column.role == Role::Split)
     }
 
     /// Returns true if a column, or the name of the file, has the role.

@@ -152,12 +152,16 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
         return Some(mistake);
     }
     let is_digit = |character: char| character.is_ascii_digit();
+    let is_digits = |text: &str| !text.is_empty() && text.chars().all(is_digit);
     let digits_after = after.strip_prefix(',').filter(|_| before.ends_with(is_digit));
     let digits_after = digits_after.or_else(|| {
         Some(after)
             .filter(|_| before.trim_end_matches(',').ends_with(is_digit) && before.ends_with(','))
     });
-    let has_comma = digits_after.is_some_and(|next| next.starts_with(is_digit));
+    let pair = before.rsplit(['=', '{']).next().and_then(|value| value.trim().split_once(','));
+    let is_split = message.contains("inline table")
+        && pair.is_some_and(|(whole, rest)| [whole, rest].iter().all(|of| is_digits(of)));
+    let has_comma = is_split || digits_after.is_some_and(|next| next.starts_with(is_digit));
     let has_point =
         digits_after.is_some_and(|next| next.trim_start_matches(is_digit).starts_with('.'));
     let is_in_escape = (message.contains("escape") || message.contains("unicode"))
@@ -185,6 +189,11 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
             marks.iter().any(|mark| line.starts_with(mark)),
             "a mark of a conflict between two versions (git)",
             "keep the lines of one version, and delete the marks <<<<<<<, ======= and >>>>>>>",
+        ),
+        (
+            has_foreign_comment(before, after),
+            "a comment of another language",
+            "TOML has no // comments: begin them with #",
         ),
         (has_no_value, "the key has no value", "write one behind the =, or delete the line"),
         (
@@ -261,6 +270,18 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
     mistake.or_else(|| mistaken_form(before, after, message, word))
 }
 
+/// Returns true if a comment of another language begins the line, or stands behind its value or
+/// header, at a place between `before` and `after`.
+fn has_foreign_comment(before: &str, after: &str) -> bool {
+    let is_mark = |text: &str| ["//", "/*", "--"].iter().any(|mark| text.starts_with(mark));
+    let word = after.split(' ').next().unwrap_or_default().trim_end_matches(',');
+    let is_value = word.parse::<f64>().is_ok() || ["true", "false"].contains(&word);
+    let has_value = is_value || !before.trim_end().ends_with(['=', '[', '{']);
+    let behind = after.strip_prefix(word).filter(|_| is_value).unwrap_or(after);
+    let behind = Some(behind.trim_start_matches([' ', '\t', ','])).filter(|_| has_value);
+    is_mark(before.trim_start()) || behind.is_some_and(is_mark)
+}
+
 /// Returns a usual mistake in the form of a line with its remedy, at a place between `before` and
 /// `after` where the parser says `message`; `word` begins there.
 fn mistaken_form(
@@ -285,6 +306,8 @@ fn mistaken_form(
         && message.contains("expected newline")
         && !before.trim_end().ends_with('=');
     let has_no_equals = message.contains("key with no value");
+    let behind_comma = after.trim_start().strip_prefix(',').map(str::trim_start);
+    let is_last_comma = behind_comma.is_some_and(|rest| rest.is_empty() || rest.starts_with('#'));
     let mistakes = [
         (
             message.contains("invalid basic string") && message.contains("expected `\"`"),
@@ -297,6 +320,11 @@ fn mistaken_form(
             "write { free = true } to free parameters, { fixed = true } to hold them",
         ),
         (is_bare, "text without quotes", "text stands in quotes, as in kind = \"fixed\""),
+        (
+            is_last_comma && message.contains("expected newline"),
+            "a comma at the end of the line",
+            "remove the comma: what is on the next line needs none",
+        ),
         (
             has_values_behind,
             "several values or keys on one line",
