@@ -273,6 +273,11 @@ pub enum WarningKind {
     )]
     FewDegrees { widest: String },
     #[error(
+        "the largest number of the column is {value}, {size} for this joint; if they are in {unit}, let \
+         its name end in {suffix}"
+    )]
+    SlideInOtherUnit { value: String, size: &'static str, unit: &'static str, suffix: &'static str },
+    #[error(
         "{rows} rows are paired by order with rows of other times, the first here: {partner} was \
          {gap} s off, and another row is nearer; write by = \"time\", or check whether a row is \
          missing or the tables are sorted differently"
@@ -421,6 +426,7 @@ impl WarningKind {
                 | Self::PositionsNotRead { .. }
                 | Self::Fahrenheit { .. }
                 | Self::FewDegrees { .. }
+                | Self::SlideInOtherUnit { .. }
                 | Self::ManyTurns { .. }
                 | Self::NoReading { .. }
         )

@@ -44,7 +44,8 @@ impl Document {
         }
         let near_text: String =
             self.text.get(span.clone()).unwrap_or_default().trim().chars().take(40).collect();
-        let usual = usual_mistake(before_in_line, line_after, error.message());
+        let usual = foreign_comment(before_in_line, line_after)
+            .or_else(|| usual_mistake(before_in_line, line_after, error.message()));
         let single = single_brackets(previous_lines, before_in_line, line_after);
         let is_repeated = error.message().contains("duplicate key");
         let single = single.filter(|_| is_repeated);
@@ -190,11 +191,6 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
             "a mark of a conflict between two versions (git)",
             "keep the lines of one version, and delete the marks <<<<<<<, ======= and >>>>>>>",
         ),
-        (
-            has_foreign_comment(before, after),
-            "a comment of another language",
-            "TOML has no // comments: begin them with #",
-        ),
         (has_no_value, "the key has no value", "write one behind the =, or delete the line"),
         (
             after.trim_start().starts_with(';') || value.contains(';') && has_numbers(&[';']),
@@ -270,16 +266,19 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
     mistake.or_else(|| mistaken_form(before, after, message, word))
 }
 
-/// Returns true if a comment of another language begins the line, or stands behind its value or
-/// header, at a place between `before` and `after`.
-fn has_foreign_comment(before: &str, after: &str) -> bool {
+/// Returns the mistake that a comment of another language begins the line, or stands behind its value
+/// or header, at a place between `before` and `after`, with its remedy; `None` without one.
+fn foreign_comment(before: &str, after: &str) -> Option<(String, &'static str)> {
     let is_mark = |text: &str| ["//", "/*", "--"].iter().any(|mark| text.starts_with(mark));
     let word = after.split(' ').next().unwrap_or_default().trim_end_matches(',');
     let is_value = word.parse::<f64>().is_ok() || ["true", "false"].contains(&word);
     let has_value = is_value || !before.trim_end().ends_with(['=', '[', '{']);
     let behind = after.strip_prefix(word).filter(|_| is_value).unwrap_or(after);
     let behind = Some(behind.trim_start_matches([' ', '\t', ','])).filter(|_| has_value);
-    is_mark(before.trim_start()) || behind.is_some_and(is_mark)
+    (is_mark(before.trim_start()) || behind.is_some_and(is_mark)).then(|| {
+        let remedy = "TOML has no // comments: begin them with #";
+        ("a comment of another language".to_owned(), remedy)
+    })
 }
 
 /// Returns a usual mistake in the form of a line with its remedy, at a place between `before` and

@@ -106,6 +106,19 @@ fn a_joint_left_out_of_a_data_sheet_is_named() {
 }
 
 #[test]
+fn sheets_of_one_name_in_two_folders_do_not_replace_each_other_silently() {
+    let sheet = "theta_deg,d_mm,alpha_deg\n0,400,0\n";
+    let folder = Folder::with([("datasheet.csv", sheet)]);
+    folder.write("b/datasheet.csv", sheet.replace("400", "500"));
+    let said = |command: &str| folder.flexcal(command).success().stderr;
+    assert!(!said("init datasheet.csv").contains("replaced"));
+    assert!(!said("init ./datasheet.csv").contains("replaced"));
+    let words = "problem.toml made of another file is replaced; --out keeps both";
+    assert_contains(&said("init b/datasheet.csv"), &[words]);
+    assert_contains(&said("init datasheet.csv"), &[words]);
+}
+
+#[test]
 fn a_data_sheet_may_have_accents_and_names_what_is_not_read() {
     let rows = "1,90,0,9,8,-20,30,v,-90\n2,0,450,9,8,-20,30,v,-90\n";
     let folder = Folder::with([("sheet.csv", "")]);

@@ -68,6 +68,7 @@ fn usual_mistakes_of_syntax_are_named() {
         ("// lift", &["TOML has no // comments"]),
         ("[tool] // lift", &["TOML has no // comments"]),
         ("name = 'lift' /* a */", &["a comment of another language; TOML has no"]),
+        ("beam = { mass_kg = 0,45, EA_N = 1 }", &["a decimal comma; write numbers with a decimal"]),
         ("d_m = .42", &["a number as TOML does not have it", "as in 0.42, 1.0 and 7"]),
         ("d_m = 1.", &["a number as TOML does not have it"]),
         ("d_m = 0O9", &["the letter O in a number, near `0O`; write the digit 0"]),
