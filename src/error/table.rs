@@ -278,7 +278,7 @@ pub enum TableErrorKind {
          {missing}, correct its name"
     )]
     RepeatedForAnother { missing: String },
-    #[error("{found} values for {expected} rows")]
+    #[error("{found} values, and {expected} in the first column; each needs one value a row")]
     ColumnLength { expected: usize, found: usize },
     #[error(
         "the row has {found} fields, the header {expected}, and the file ends here without a \

@@ -138,7 +138,7 @@ fn a_table_in_memory_is_read_as_the_file_is() {
         (replaced("z_mm", words(3, "")), "memory:5: column z_mm: the cell is empty"),
         (
             replaced("z_mm", ColumnValues::Numbers(vec![0.0])),
-            "memory: column z_mm: 1 values for 78 rows",
+            "memory: column z_mm: 1 values, and 78 in the first column",
         ),
     ];
     for (found, expected) in told {
