@@ -212,11 +212,8 @@ impl Columns {
     pub fn has_joints(table: &Table, problem: &Problem) -> bool {
         let names = Names::map_present(table, &problem.data.dialect);
         let numbering = Numbering::detect(names.iter().copied(), problem);
-        let is_joint = |name: &&str| {
-            let meaning = numbering.recognise(name, problem);
-            matches!(meaning, Ok(Meaning::Read(Role::Joint(_) | Role::Reading(_), _)))
-        };
-        names.iter().any(is_joint)
+        let mut meanings = names.iter().map(|name| numbering.recognise(name, problem));
+        meanings.any(|of| matches!(of, Ok(Meaning::Read(Role::Joint(_) | Role::Reading(_), _))))
     }
 
     /// Checks that all required columns exist. Errors about missing columns suggest similar names
@@ -439,8 +436,7 @@ impl Columns {
 
     /// Returns true if a column, or the name of the file, has the role.
     pub fn has(&self, role: Role) -> bool {
-        self.file == Some(role)
-            || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
+        self.file == Some(role) || self.place(role).is_some()
     }
 }
 
@@ -451,10 +447,8 @@ fn is_missing_column(error: &InputError) -> bool {
 
 /// Returns true for a column name that occurs only in result tables of flexcal.
 fn is_unmistakable_result(name: &str) -> bool {
-    let is_bound = name
-        .strip_prefix("bound")
-        .and_then(|rest| rest.strip_suffix("_mm"))
-        .is_some_and(|level| level.starts_with(|digit: char| digit.is_ascii_digit()));
+    let level = name.strip_prefix("bound").and_then(|rest| rest.strip_suffix("_mm"));
+    let is_bound = level.is_some_and(|level| level.starts_with(|c: char| c.is_ascii_digit()));
     let starts = ["predicted_", "residual_", "miss_"];
     is_bound || starts.iter().any(|start| name.starts_with(start))
 }
