@@ -50,7 +50,7 @@ class Export(Result):
     @once
     def errors(self) -> pd.DataFrame:
         """Errors on the held-out rows, or on the fitted rows if none is held out (column ``rows``) [mm]: of the ``whole`` model, of the ``rigid`` geometry that the file holds, and of those that it
-        could hold instead (``identified``, ``best_rigid``, ``fitted_alone``), unless they are the same."""
+        could hold instead (``identified``, ``best_rigid``, ``fitted_alone``), unless they are the same; and of the ``nominal`` arm."""
         import pandas as pd
 
         rows = "held_out" if self._document["held_out"] is not None else "fitted"

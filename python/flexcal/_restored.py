@@ -73,7 +73,7 @@ class Restored:
 
 METHODS = ("json", "summary", "report", "covariance", "priors", "residuals", "closed_problem", "csv", "parameters_csv")
 """What the extension module says when it is called."""
-PROPERTIES = ("why_not_trusted", "cautions", "why_not_sufficient", "suffices", "text", "unused_split", "warnings")
+PROPERTIES = ("why_not_trusted", "cautions", "doubted_bounds", "why_not_sufficient", "suffices", "text", "unused_split", "warnings")
 """What it says without a call."""
 
 

@@ -62,7 +62,7 @@ def changed(**columns: Any) -> pd.DataFrame:
         (changed(split=FRAME["split"].where(FRAME["pose"] != 2, "test")), 3, "column split", "neither"),
         (changed(split=FRAME["split"].where(FRAME["pose"] != 2)), 3, "column split", "empty"),
         (FRAME.iloc[:0], 1, None, "no rows"),
-        ({"q1_deg": [1.0, 2.0], "x_mm": [1.0]}, None, "column x_mm", "1 values for 2 rows"),
+        ({"q1_deg": [1.0, 2.0], "x_mm": [1.0]}, None, "column x_mm", "1 values, and 2 in the first column"),
         ({"x_mm": np.zeros((2, 2))}, None, "column x_mm", "two dimensions"),
         ({"q_deg": np.zeros((3, 60)), "x_mm": np.zeros(60)}, None, "column q_deg", "transpose the array"),
         ({"xyz_mm": np.zeros((3, 60))}, None, "column xyz_mm", r"\(rows, 3\) is needed"),

@@ -106,7 +106,7 @@ def test_covariates_of_ones_own() -> None:
         np.testing.assert_allclose(found["estimate"], 2e-3, rtol=1e-3)
         np.testing.assert_allclose(result.predict(q, tilt_deg=tilt), moved, atol=1e-7)
     assert abs(result.predict(q[0], tilt_deg=1.0) - result.predict(q[0], tilt_deg=0.0)).max() > 1e-4
-    for wrong, words in ((q, "column tilt_deg: missing"), ({**data, "tilt_deg": tilt[:-1]}, "59 values for 60 rows")):
+    for wrong, words in ((q, "column tilt_deg: missing"), ({**data, "tilt_deg": tilt[:-1]}, "59 values, and 60 in the first column")):
         with pytest.raises(flexcal.InputError, match=words) as caught:
             result.predict(wrong)
         assert caught.value.key == "column tilt_deg"

@@ -103,6 +103,7 @@ fn by_arguments(error: &DesignError) -> Option<String> {
         }
         DesignError::SameEffect { .. }
         | DesignError::DeclaredEffect { .. }
+        | DesignError::CausesAlike { .. }
         | DesignError::FollowsTime { .. } => Some(format!("--separate: {error}")),
         _ => None,
     }

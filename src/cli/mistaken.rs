@@ -148,6 +148,11 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
                 )
             })
         }
+        ErrorKind::MissingRequiredArgument if first.starts_with("--estimate") => Some(
+            "flexcal identify writes estimate.json, and flexcal loop one in its folder closed: \
+             --estimate out/<name of the problem>/estimate.json"
+                .to_owned(),
+        ),
         ErrorKind::UnknownArgument if first.starts_with('-') => {
             let is_command = |word: &&str| cli.find_subcommand(word).is_some();
             let command = words.iter().skip(1).filter_map(|word| word.to_str()).find(is_command)?;

@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 use flexcal::error::{escape_hidden, is_hidden};
-use flexcal::files::{Batch, FolderLock, FolderRecord, MAX_LOCK_WAIT, same_file};
+use flexcal::files::{Batch, FolderLock, FolderRecord, MAX_LOCK_WAIT, digest, same_file};
 use flexcal::report::{Report, is_figure};
 
 use super::{diagnostic, interrupt};
@@ -154,6 +154,7 @@ impl Results {
         let mut record = self.record()?;
         texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
         let replaced = self.replaced_by_other_command(&record, texts);
+        let replaced_sheet = self.replace_source(&mut record);
         let is_left = |name: &str| {
             let claimed = self.names.iter().any(|claimed| claimed == name)
                 && texts.iter().all(|(written, _)| *written != name);
@@ -173,6 +174,12 @@ impl Results {
         batch.commit(&lock, &record, &outdated).map_err(failed(self.folder.clone()))?;
         interrupt::mark_written();
         drop((exit_blocked, lock));
+        if replaced_sheet && !self.quiet {
+            diagnostic::warn(&format!(
+                "{} made of another file is replaced; --out keeps both",
+                self.path(self.names.first().map_or("", String::as_str)).display()
+            ));
+        }
         if let (Some((name, other)), false) = (replaced, self.quiet) {
             let what = if name == REPORT[0] { "the report" } else { &name };
             diagnostic::warn(&format!(
@@ -180,6 +187,25 @@ impl Results {
             ));
         }
         Ok(())
+    }
+
+    /// Records of which file the results of `init` are made, whose folder has the name of the arm;
+    /// returns true if those there were made of another one.
+    fn replace_source(&self, record: &mut FolderRecord) -> bool {
+        const MADE_OF: &str = "made of ";
+        let Some(input) = self.inputs.first().filter(|_| self.command == "init") else {
+            return false;
+        };
+        let path = input.canonicalize().unwrap_or_else(|_| input.clone());
+        let source = format!("{MADE_OF}{}", digest(path.to_string_lossy().as_bytes()));
+        let is_there = self.names.iter().any(|name| self.is_recorded(name));
+        let others = record.names().filter(|name| name.starts_with(MADE_OF) && *name != source);
+        let others: Vec<String> = others.map(str::to_owned).collect();
+        for other in &others {
+            record.remove(other);
+        }
+        record.add(self.command, &source, "");
+        is_there && !others.is_empty()
     }
 
     /// Returns the first of the files `texts` that another command wrote, a report before other

@@ -133,7 +133,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let (plan, separated) = match result {
         Err(alike @ DesignError::CausesAlike { .. }) => {
-            diagnostic::warn(&format!("--separate: {alike}"));
+            diagnostic::print(&alike);
             return Ok(Outcome::NotMet);
         }
         result => result?,

@@ -90,6 +90,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
     }
     common.warn_of_loads(&problem, &estimate, &rows);
+    let is_without_data = common.data().is_empty();
+    common.hint(is_without_data.then_some(
+        "rows of the problem's tables that the estimate did not fit are judged; if they were measured \
+         before it, no change since can be seen: give new ones with --data FILE",
+    ));
     let unknown: Vec<String> =
         estimate.unknown_sessions(&rows).into_iter().map(str::to_owned).collect();
     common.hint(unknown.iter().map(|session| {

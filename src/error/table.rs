@@ -252,6 +252,11 @@ pub enum TableErrorKind {
     )]
     DecimalComma { value: String },
     #[error(
+        "\"{value}\" is a text, not a number; if the numbers of a file have decimal commas, read it \
+         so: pandas.read_csv(FILE, decimal=\",\")"
+    )]
+    TextInMemory { value: String },
+    #[error(
         "\"{value}\" has a decimal point, and [data.format] says decimal = \",\"; write the \
          number with a comma and without \
          thousands separators, or correct decimal"
@@ -273,7 +278,7 @@ pub enum TableErrorKind {
          {missing}, correct its name"
     )]
     RepeatedForAnother { missing: String },
-    #[error("{found} values for {expected} rows")]
+    #[error("{found} values, and {expected} in the first column; each needs one value a row")]
     ColumnLength { expected: usize, found: usize },
     #[error(
         "the row has {found} fields, the header {expected}, and the file ends here without a \

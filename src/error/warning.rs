@@ -25,6 +25,16 @@ pub enum WarningKind {
     )]
     ColumnsIgnored { names: Vec<String>, more: usize },
     #[error(
+        "the row of {missing} seems to be missing before {before}: the arm is taken to have {joints} \
+         joints; add it, or number the rows without a gap"
+    )]
+    JointLeftOut { missing: String, before: String, joints: usize },
+    #[error(
+        "no positions are read, though unknown columns seem to be x, y and z: to read them, write \
+         {map} in {section}"
+    )]
+    PositionsNotRead { section: &'static str, map: String },
+    #[error(
         "no column of {} has a name of [data.columns]; the table is read by flexcal's names",
         file.display()
     )]
@@ -263,6 +273,11 @@ pub enum WarningKind {
     )]
     FewDegrees { widest: String },
     #[error(
+        "the largest number of the column is {value}, {size} for this joint; if they are in {unit}, let \
+         its name end in {suffix}"
+    )]
+    SlideInOtherUnit { value: String, size: &'static str, unit: &'static str, suffix: &'static str },
+    #[error(
         "{rows} rows are paired by order with rows of other times, the first here: {partner} was \
          {gap} s off, and another row is nearer; write by = \"time\", or check whether a row is \
          missing or the tables are sorted differently"
@@ -408,8 +423,10 @@ impl WarningKind {
         matches!(
             self,
             Self::Kelvins { .. }
+                | Self::PositionsNotRead { .. }
                 | Self::Fahrenheit { .. }
                 | Self::FewDegrees { .. }
+                | Self::SlideInOtherUnit { .. }
                 | Self::ManyTurns { .. }
                 | Self::NoReading { .. }
         )

@@ -29,7 +29,7 @@ impl Beginning {
     }
 
     /// Returns the cells of the rows below the header. A row that is cut off is left out.
-    fn rows(&self) -> Vec<Vec<String>> {
+    pub fn rows(&self) -> Vec<Vec<String>> {
         let text = decoded(&self.text).replace("\r\n", "\n").replace('\r', "\n");
         let is_cut = self.text.len() as u64 >= HEADER_SEARCH_BYTES;
         let whole =
@@ -53,6 +53,12 @@ impl Beginning {
         let rows = self.rows();
         let mut marks = rows.iter().flatten().filter_map(|cell| mark(cell)).peekable();
         marks.peek().is_some() && marks.all(|mark| mark == Mark::Point)
+    }
+
+    /// Returns true if a comma stands between two digits.
+    pub fn has_decimal_commas(&self) -> bool {
+        let is_decimal = |of: &[u8]| matches!(of, [b'0'..=b'9', b',', b'0'..=b'9']);
+        self.text.windows(3).any(is_decimal)
     }
 
     /// Returns the indices of the columns that hold words, not only numbers.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
+use super::foreign_name::guess;
 use super::headerless::{holds_numbers, no_header};
 use super::mapped::{Names, no_such};
 use super::meaning::{
@@ -168,7 +169,7 @@ impl Columns {
             warnings.push(Warning { location: table.column("miss_mm"), kind });
         }
         if let (Some(HeldOut::Fraction { .. }), true) =
-            (&problem.data.held_out, measured && columns.has_split())
+            (&problem.data.held_out, measured && columns.has(Role::Split))
         {
             let (location, kind) = (table.column("split"), WarningKind::SplitUnused);
             warnings.push(Warning { location, kind });
@@ -186,6 +187,9 @@ impl Columns {
         if let Some(rule) = named.unused.filter(|_| measured) {
             let kind = WarningKind::MapUnused { file: table.file.clone() };
             warnings.push(Warning { location: rule.location.clone(), kind });
+        }
+        if !measured {
+            warnings.extend(columns.unread_positions(table, problem, &unknown)?);
         }
         let required = columns.require(table, problem, measured, &numbering, &unknown);
         required.map_err(|error| match (hidden, named.unused) {
@@ -208,11 +212,8 @@ impl Columns {
     pub fn has_joints(table: &Table, problem: &Problem) -> bool {
         let names = Names::map_present(table, &problem.data.dialect);
         let numbering = Numbering::detect(names.iter().copied(), problem);
-        let is_joint = |name: &&str| {
-            let meaning = numbering.recognise(name, problem);
-            matches!(meaning, Ok(Meaning::Read(Role::Joint(_) | Role::Reading(_), _)))
-        };
-        names.iter().any(is_joint)
+        let mut meanings = names.iter().map(|name| numbering.recognise(name, problem));
+        meanings.any(|of| matches!(of, Ok(Meaning::Read(Role::Joint(_) | Role::Reading(_), _))))
     }
 
     /// Checks that all required columns exist. Errors about missing columns suggest similar names
@@ -226,7 +227,6 @@ impl Columns {
         unknown: &[&str],
     ) -> Result<(), InputError> {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
-        let strangers = || self.of_numbers(unknown, table);
         let missing = |bases: &[&str], unit: Unit| {
             if let Some(error) =
                 bases.iter().find_map(|base| self.in_foreign_unit(table, base, unit))
@@ -235,10 +235,14 @@ impl Columns {
             }
             let write =
                 bases.iter().map(|base| unit.alternatives(base)).collect::<Vec<_>>().join(" or ");
-            let near =
-                bases.iter().flat_map(|base| unit.spellings(base)).find_map(|name| near(&name));
+            let mut spellings = bases.iter().flat_map(|base| unit.spellings(base));
+            let near = spellings.find_map(|name| near(&name));
             let first = bases.first().copied().unwrap_or_default();
-            let kind = TableErrorKind::MissingColumn { write, near, unknown: strangers() };
+            let kind = TableErrorKind::MissingColumn {
+                write,
+                near,
+                unknown: self.of_numbers(unknown, table),
+            };
             Err(table.column(first).error(kind))
         };
         let (source, suffix): (fn(usize) -> Role, _) = match problem.data.joints {
@@ -335,7 +339,9 @@ impl Columns {
         unit: Unit,
     ) -> Option<InputError> {
         let of_base = |name: &String| {
-            let suffix = name.strip_prefix(base)?.strip_prefix('_')?;
+            let suffix = name.strip_prefix(base).and_then(|rest| rest.strip_prefix('_'));
+            let guessed = || guess(name).filter(|(guessed, _)| guessed == base)?.1;
+            let suffix = suffix.or_else(guessed).filter(|suffix| unit.suffix(suffix).is_none())?;
             Some((suffix.to_owned(), unit.convert_foreign(suffix, 1.0)?))
         };
         let (name, (suffix, factor)) =
@@ -428,15 +434,9 @@ impl Columns {
         (is_complete(3, Role::Orientation), is_complete(4, Role::Quaternion))
     }
 
-    /// Returns true if there is a column `split`.
-    fn has_split(&self) -> bool {
-        self.read.iter().any(|column| column.role == Role::Split)
-    }
-
     /// Returns true if a column, or the name of the file, has the role.
     pub fn has(&self, role: Role) -> bool {
-        self.file == Some(role)
-            || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
+        self.file == Some(role) || self.place(role).is_some()
     }
 }
 
@@ -447,10 +447,8 @@ fn is_missing_column(error: &InputError) -> bool {
 
 /// Returns true for a column name that occurs only in result tables of flexcal.
 fn is_unmistakable_result(name: &str) -> bool {
-    let is_bound = name
-        .strip_prefix("bound")
-        .and_then(|rest| rest.strip_suffix("_mm"))
-        .is_some_and(|level| level.starts_with(|digit: char| digit.is_ascii_digit()));
+    let level = name.strip_prefix("bound").and_then(|rest| rest.strip_suffix("_mm"));
+    let is_bound = level.is_some_and(|level| level.starts_with(|c: char| c.is_ascii_digit()));
     let starts = ["predicted_", "residual_", "miss_"];
     is_bound || starts.iter().any(|start| name.starts_with(start))
 }

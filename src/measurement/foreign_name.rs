@@ -1,5 +1,7 @@
 //! Names of joint and position columns as other programs write them.
 
+use crate::quantity::Unit;
+
 /// Words that other programs write before the number of a joint.
 const JOINT_WORDS: [&str; 12] =
     ["j", "q", "a", "ax", "axis", "axe", "achse", "joint", "jt", "gelenk", "theta", "th"];
@@ -12,14 +14,21 @@ const POSITION_WORDS: [&str; 10] =
 pub(super) fn guess(name: &str) -> Option<(String, Option<&'static str>)> {
     let lower = name.to_lowercase();
     let words = lower.split(|letter: char| !letter.is_alphanumeric());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
     let (mut unit, mut plain) = (None, String::new());
-    for word in words.filter(|word| !word.is_empty()) {
+    for (place, &word) in words.iter().enumerate() {
+        let is_last = place > 0 && place + 1 == words.len();
+        let mut foreign = [Unit::Length, Unit::Angle].into_iter().flat_map(Unit::foreign_suffixes);
         match word {
             "mm" | "millimeter" | "millimetre" => unit = Some("mm"),
             "m" | "meter" | "metre" => unit = Some("m"),
             "deg" | "degree" | "degrees" | "grad" => unit = Some("deg"),
             "rad" | "radian" | "radians" => unit = Some("rad"),
-            word => plain.push_str(word),
+            "inch" | "inches" => unit = Some("in"),
+            word => match foreign.find(|suffix| is_last && *suffix == word) {
+                Some(suffix) => unit = Some(suffix),
+                None => plain.push_str(word),
+            },
         }
     }
     unit = unit.or_else(|| name.contains('°').then_some("deg"));
@@ -46,10 +55,13 @@ mod tests {
             ("theta_2", "q2", None),
             ("X (mm)", "x", Some("mm")),
             ("TCP.z [m]", "z", Some("m")),
+            ("X (in)", "x", Some("in")),
+            ("Y [inch]", "y", Some("in")),
+            ("z_cm", "z", Some("cm")),
         ] {
             assert_eq!(guess(name), Some((base.to_owned(), unit)), "{name}");
         }
-        for name in ["Name", "RMS", "Timestamp", "Point 3", "rx", "max", "dx1"] {
+        for name in ["Name", "RMS", "Timestamp", "Point 3", "rx", "max", "dx1", "in x 3"] {
             assert_eq!(guess(name), None, "{name}");
         }
     }

@@ -8,7 +8,7 @@ use super::foreign_name::guess;
 use super::meaning::{Numbering, split_unit, unit_of};
 use super::role::{POSITION, Role};
 use super::table::Table;
-use crate::error::{InputError, Location, TableErrorKind};
+use crate::error::{InputError, Location, TableErrorKind, Warning, WarningKind};
 use crate::problem::{JointSource, Problem};
 use crate::quantity::Unit;
 
@@ -75,15 +75,7 @@ impl Columns {
             });
             map.push(found?);
         }
-        let (section, entries): (_, Vec<String>) = (
-            if problem.data.dialect.columns.is_empty() { "[data]" } else { "[data.columns]" },
-            map.iter().map(|(theirs, ours)| format!("\"{theirs}\" = \"{ours}\"")).collect(),
-        );
-        let map = if section == "[data]" {
-            format!("columns = {{ {} }}", entries.join(", "))
-        } else {
-            format!("the lines {}", entries.join(" and "))
-        };
+        let (section, map) = map_of(&map, problem);
         let missing: Vec<String> = missing.into_iter().map(|(base, _)| base).collect();
         let kind = TableErrorKind::MissingColumns { missing, section, map };
         let location = Location { key: None, ..table.column("") };
@@ -91,7 +83,54 @@ impl Columns {
     }
 }
 
+/// Returns the section of a problem file, and what to write there so that each column of another
+/// program is read under its name in flexcal.
+fn map_of(map: &[(&str, String)], problem: &Problem) -> (&'static str, String) {
+    let entries: Vec<String> =
+        map.iter().map(|(theirs, ours)| format!("\"{theirs}\" = \"{ours}\"")).collect();
+    if problem.data.dialect.columns.is_empty() {
+        ("[data]", format!("columns = {{ {} }}", entries.join(", ")))
+    } else {
+        ("[data.columns]", format!("the lines {}", entries.join(" and ")))
+    }
+}
+
 impl Columns {
+    /// Returns a warning if a table of poses that need not be measured has no column of positions,
+    /// but `unknown` ones of numbers that are probably x, y and z.
+    ///
+    /// # Errors
+    /// Returns an error if one of them is in a unit that tables cannot have.
+    pub fn unread_positions(
+        &self,
+        table: &Table,
+        problem: &Problem,
+        unknown: &[&str],
+    ) -> Result<Option<Warning>, InputError> {
+        let axes = ["x", "y", "z"];
+        if self.observes() || POSITION.into_iter().any(|role| self.has(role)) {
+            return Ok(None);
+        }
+        let foreign = axes.iter().find_map(|axis| self.in_foreign_unit(table, axis, Unit::Length));
+        if let Some(error) = foreign {
+            return Err(error);
+        }
+        let names = self.of_numbers(unknown, table);
+        let of_axis = |axis: &&str| {
+            let found = names.iter().find_map(|theirs| {
+                Some((theirs.as_str(), guess(theirs).filter(|(guessed, _)| guessed == axis)?.1))
+            });
+            let (theirs, unit) = found?;
+            Some((theirs, format!("{axis}_{}", unit.unwrap_or("mm"))))
+        };
+        let map: Option<Vec<(&str, String)>> = axes.iter().map(of_axis).collect();
+        Ok(map.map(|map| {
+            let (section, map) = map_of(&map, problem);
+            let location = Location { key: None, ..table.column("") };
+            Warning { location, kind: WarningKind::PositionsNotRead { section, map } }
+        }))
+    }
+
     /// Returns the error of a table that has no column of joints or measurements, nor an `unknown`
     /// one of numbers; `None` for other tables.
     fn of_another_table(

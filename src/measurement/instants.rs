@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::join_key::is_time;
 use super::table::{Table, shortened};
-use super::time::{date_part, date_time, is_ambiguous, number_as_time};
+use super::time::{DateOrder, date_part, date_time, is_ambiguous, number_as_time};
 use crate::error::{InputError, TableErrorKind};
 use crate::problem::{ColumnSelector, Dialect};
 
@@ -26,6 +26,37 @@ fn joined(date: &str, time: &str) -> String {
 }
 
 impl Table {
+    /// Finds the order of day and month: by the columns of times and dates if there are any, else by
+    /// all. Where it stays unknown, decimal commas make the day likely to stand first.
+    pub(super) fn find_date_order(&mut self, dialect: &Dialect) {
+        let rows = self.beginning.rows();
+        let is_ruled = |place: usize, name: &String| {
+            let is_here = |theirs: &ColumnSelector| match theirs {
+                ColumnSelector::Name(theirs) => theirs == name,
+                ColumnSelector::Place(number) => *number == place + 1,
+                ColumnSelector::File => false,
+            };
+            dialect.columns.iter().any(|rule| is_clock(&rule.ours) && is_here(&rule.theirs))
+        };
+        let is_clock = |(place, name): &(usize, &String)| {
+            let lower = name.to_lowercase();
+            let is_named = |names: &[&str]| names.contains(&lower.as_str());
+            is_clock(name) || is_named(&DATES) || is_named(&TIMES_OF_DAY) || is_ruled(*place, name)
+        };
+        let clocks: Vec<usize> =
+            self.header.iter().enumerate().filter(is_clock).map(|(place, _)| place).collect();
+        let cells = rows.iter().flat_map(|row| row.iter().enumerate());
+        let is_chosen = |place: usize| clocks.is_empty() || clocks.contains(&place);
+        let chosen = cells.filter(|(place, _)| is_chosen(*place)).map(|(_, cell)| cell.as_str());
+        let may_be_day_first = dialect.decimal_comma && self.style.delimiter != ',';
+        self.date_order = match DateOrder::of(chosen.collect::<Vec<_>>().join(" ").as_bytes()) {
+            DateOrder::Unknown if may_be_day_first && self.beginning.has_decimal_commas() => {
+                DateOrder::LikelyDayFirst
+            }
+            order => order,
+        };
+    }
+
     /// Finds a column of dates and one with the time of day, by the rules of `[data.columns]` or by
     /// their names and first cells. A column of the time of day without a rule is called `time`.
     pub(super) fn find_date_columns(&mut self, dialect: &Dialect) {

@@ -8,11 +8,9 @@ use super::clocks::{
     ClockShift, Stops, best_shift, clock_jump, median_step, moving_arm, nearest, rounded_up,
     shifts_by_rows,
 };
-use super::headerless::{holds_numbers, no_header};
 use super::instants::is_clock;
-use super::join_key::{Key, name_column, time_key};
+use super::join_key::{Key, find_key, name_column, time_key};
 use super::mapped::Names;
-use super::meaning::is_numbered_or_position;
 use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
 use super::spelling::{misplaced, quoted, same_but_for_spelling, usual_difference};
 use super::table::{Table, shortened};
@@ -45,6 +43,8 @@ pub(super) struct JoinedLog {
     rows: Vec<LogRow>,
     /// Index of the row with each name, for a join by name.
     of_name: HashMap<String, usize>,
+    /// Errors of the names that several rows have, which only a measured row with the name reports.
+    repeated: HashMap<String, InputError>,
     /// Row indices in the order of their times, for a join by time.
     by_time: Vec<usize>,
     /// Times of the rows in ascending order, on the clock of the measurements \[s\].
@@ -89,7 +89,7 @@ impl JoinedLog {
     ///
     /// # Errors
     /// Returns an error if a file cannot be read, its columns differ from those of the first, the
-    /// key column is missing, or a name occurs twice.
+    /// key column is missing.
     pub fn read(log: &JointLog, problem: &Problem) -> Result<Self, InputError> {
         let dialect = &problem.data.dialect;
         let mut joined = Self { rule: log.by, location: log.location.clone(), ..Self::default() };
@@ -126,7 +126,7 @@ impl JoinedLog {
             let kind = TableErrorKind::ColumnsDiffer { other: first, has: false };
             return Err(table.column(name.map_or("", String::as_str)).error(kind));
         }
-        let key = self.find_key(&table, &self.names)?;
+        let key = find_key(self.rule, &table, (&self.names, dialect))?;
         let clock = time_key(&self.names).filter(|_| self.rule == JoinRule::Order);
         while table.next_row()? {
             let mut time = f64::NAN;
@@ -139,10 +139,12 @@ impl JoinedLog {
                     let name = table.name(key.place)?.to_owned();
                     if let Some(&first) = self.of_name.get(&name) {
                         let line = self.rows.get(first).map_or(0, |row| row.source.line);
-                        let kind = TableErrorKind::RepeatedPose { name, line };
-                        return Err(table.cell_error(key.place, kind));
+                        let kind = TableErrorKind::RepeatedPose { name: name.clone(), line };
+                        let error = table.cell_error(key.place, kind);
+                        self.repeated.entry(name).or_insert(error);
+                    } else {
+                        self.of_name.insert(name, self.rows.len());
                     }
-                    self.of_name.insert(name, self.rows.len());
                 }
                 _ => {
                     let of_row = clock.and_then(|key| table.time(key.place, key.to_si).ok());
@@ -157,29 +159,6 @@ impl JoinedLog {
         Ok(())
     }
 
-    /// Returns the column by which rows are paired; `None` for a join by order.
-    fn find_key(&self, table: &Table, names: &[String]) -> Result<Option<Key>, InputError> {
-        let (key, write) = match self.rule {
-            JoinRule::Order => return Ok(None),
-            JoinRule::Name => (
-                name_column(names).map(|place| Key { place, to_si: std::convert::identity }),
-                "pose or name",
-            ),
-            JoinRule::Time { .. } => (time_key(names), "time_s or time"),
-        };
-        let is_unknown = |(ours, theirs): &(&String, &String)| {
-            ours == theirs && !ours.is_empty() && !is_numbered_or_position(ours)
-        };
-        let names = names.iter().zip(&table.header).filter(is_unknown);
-        let unknown = names.map(|(name, _)| name.clone()).collect();
-        let kind = if holds_numbers(&table.header) {
-            no_header(&table.header)
-        } else {
-            TableErrorKind::MissingColumn { write: write.to_owned(), near: None, unknown }
-        };
-        key.map(Some).ok_or_else(|| table.column(write).error(kind))
-    }
-
     /// Appends to a table of measured rows the columns that only the joint table has.
     ///
     /// # Errors
@@ -187,7 +166,7 @@ impl JoinedLog {
     pub fn extend(&mut self, table: &mut Table, dialect: &Dialect) -> Result<(), InputError> {
         let names: Vec<String> =
             Names::map_present(table, dialect).into_iter().map(str::to_owned).collect();
-        self.key = self.find_key(table, &names)?;
+        self.key = find_key(self.rule, table, (&names, dialect))?;
         self.clock = time_key(&names).filter(|_| self.rule != JoinRule::Name);
         if self.rule == JoinRule::Order {
             self.name_columns = name_column(&names).zip(name_column(&self.names));
@@ -225,6 +204,9 @@ impl JoinedLog {
         let partner = match (self.rule, self.key) {
             (JoinRule::Name, Some(key)) => {
                 let name = table.name(key.place)?;
+                if let Some(error) = self.repeated.remove(name) {
+                    return Err(error);
+                }
                 let partner = self.of_name.get(name).copied();
                 if partner.is_none() {
                     self.unpaired_names.push(name.to_owned());

@@ -68,7 +68,7 @@ impl Commands<'_> {
     }
 
     /// Converts an SI value to the unit of the column, rounded to six decimals.
-    fn shown(&self, value: f64) -> f64 {
+    pub(super) fn shown(&self, value: f64) -> f64 {
         (value / (self.to_si)(1.0) * 1e6).round() / 1e6
     }
 

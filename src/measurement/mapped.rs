@@ -138,7 +138,7 @@ impl<'a> Names<'a> {
 /// Returns the error of a rule that is written the wrong way round, ours = theirs; `None` for a
 /// right rule. In such a rule only the first name is one of flexcal, and the table has a column
 /// with the second name and none with the first.
-fn reversed(rule: &ColumnRule, table: &Table) -> Option<InputError> {
+pub(super) fn reversed(rule: &ColumnRule, table: &Table) -> Option<InputError> {
     let ColumnSelector::Name(name) = &rule.theirs else { return None };
     let is_reversed = is_numbered_or_position(name)
         && !is_numbered_or_position(&rule.ours)

@@ -99,8 +99,8 @@ impl Numbering {
             Some(number) => unit_of(problem.joints.get(self.joint(number)?)?.command_kind())?,
             None => Unit::Length,
         };
-        let written = written.filter(|written| unit.suffix(written).is_some());
-        Some(format!("{base}_{}", written.unwrap_or(unit.in_tables().suffix)))
+        let written = written.unwrap_or(unit.in_tables().suffix);
+        unit.suffix(written).is_some().then(|| format!("{base}_{written}"))
     }
 
     /// Returns the meaning of a column with the velocity of a joint, such as `qd1_deg_per_s`; `None` for

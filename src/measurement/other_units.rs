@@ -35,6 +35,11 @@ const MIN_ROWS: usize = 10;
 /// Declared range of every revolute joint above which motions of a few degrees are suspect \[rad\].
 const MIN_WIDE_RANGE: f64 = 1.0;
 
+/// Largest plausible way of a joint that slides \[m\].
+const MAX_SLIDE: f64 = 20.0;
+/// Smallest plausible way of a joint that slides, as a fraction of its declared range.
+const MIN_SHARE_OF_RANGE: f64 = 0.01;
+
 /// Sizes of numbers that loggers write where a sensor gives no reading.
 const PLACEHOLDERS: [f64; 13] = [
     99.0, 99.9, 99.99, 273.15, 999.0, 999.9, 999.99, 9999.0, 9999.9, 32_767.0, 32_768.0, 65_535.0,
@@ -239,6 +244,35 @@ impl Measurements {
         };
         (length(longest) < MIN_PLAUSIBLE_DISTANCE * links)
             .then(|| self.warning(longest, "distance_mm", kind))
+    }
+
+    /// Returns a warning, located at the largest number, for each column of a joint that slides whose
+    /// numbers are probably in the other unit of lengths: far more than an arm is long, or far less
+    /// than the declared range.
+    pub(super) fn slides(&self, problem: &Problem, columns: &[Commands]) -> Vec<Warning> {
+        let warning = |column: &Commands| {
+            let joint = problem.joints.get(column.joint).filter(|joint| !joint.takes_angle())?;
+            let range = joint.limits.1 - joint.limits.0;
+            let value = |row: usize| self.configuration(row).get(column.joint).map(|q| q.abs());
+            let largest = |a: &usize, b: &usize| value(*a).partial_cmp(&value(*b));
+            let rows = 0..self.len();
+            let row = rows.max_by(|a, b| largest(a, b).unwrap_or(std::cmp::Ordering::Equal))?;
+            let most = value(row).filter(|most| *most > 0.0)?;
+            let (size, unit, suffix) = match column.unit() {
+                "m" if range.is_infinite() && most > MAX_SLIDE => ("much", "millimetres", "_mm"),
+                "mm" if range.is_finite()
+                    && self.len() >= MIN_ROWS
+                    && most < MIN_SHARE_OF_RANGE * range =>
+                {
+                    ("little", "metres", "_m")
+                }
+                _ => return None,
+            };
+            let value = format!("{} {}", column.shown(most), column.unit());
+            let kind = WarningKind::SlideInOtherUnit { value, size, unit, suffix };
+            Some(self.warning(row, format!("column {}", column.name), kind))
+        };
+        columns.iter().filter_map(warning).collect()
     }
 
     /// Returns a warning, located at the largest angle, if columns in degrees are probably in

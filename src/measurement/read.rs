@@ -159,7 +159,12 @@ impl Measurements {
         let dialect =
             problem.data.dialect.in_memory(matches!(table_use, Use::Measured | Use::Judged));
         let table = Table::from_reader(&name, &dialect, Box::new(table.into_text()))?;
-        tables.read(0, table, &dialect)?;
+        tables.read(0, table, &dialect).map_err(|error| match *error.kind {
+            InputErrorKind::Table(TableErrorKind::DecimalComma { value }) => {
+                error.location.error(TableErrorKind::TextInMemory { value })
+            }
+            kind => error.location.error(kind),
+        })?;
         tables.finish()
     }
 }
@@ -368,6 +373,7 @@ impl<'a> Tables<'a> {
                 let in_kilograms = measurements.hoist_in_kilograms(problem);
                 warnings.extend(exchanged.or(in_kilograms));
                 warnings.extend(measurements.few_degrees(problem, &commands));
+                warnings.extend(measurements.slides(problem, &commands));
                 warnings.extend(measurements.milliseconds());
                 warnings.extend(measurements.heavy_payload(problem));
                 warnings.extend(measurements.missing_payload(problem));

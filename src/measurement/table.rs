@@ -67,11 +67,6 @@ pub(super) struct Table {
     last_cells: LastCells,
 }
 
-/// Returns true if a digit, a comma and a digit follow each other in a text.
-fn has_decimal_commas(text: &[u8]) -> bool {
-    text.windows(3).any(|of| matches!(of, [b'0'..=b'9', b',', b'0'..=b'9']))
-}
-
 impl Table {
     /// Opens a file with the given `dialect` and reads its header; `missing` makes the error if the
     /// file does not exist.
@@ -101,16 +96,6 @@ impl Table {
             return Err(Location::file(file).error(other_format(found)));
         }
         let layout = Layout::detect(&beginning, dialect);
-        let date_order = match DateOrder::of(&beginning) {
-            DateOrder::Unknown
-                if dialect.decimal_comma
-                    && layout.byte() != b','
-                    && has_decimal_commas(&beginning) =>
-            {
-                DateOrder::LikelyDayFirst
-            }
-            order => order,
-        };
         let start: Arc<[u8]> = beginning.into();
         let text = Cursor::new(Arc::clone(&start)).chain(input);
         let lines = Lines::new(BufReader::with_capacity(1 << 16, text));
@@ -131,7 +116,7 @@ impl Table {
                 decimal_comma: dialect.decimal_comma,
             },
             starts_with_row: false,
-            date_order,
+            date_order: DateOrder::Unknown,
             date_columns: None,
             appended: None,
             beginning: Beginning::new(start, layout, dialect.comment.clone()),
@@ -174,6 +159,7 @@ impl Table {
         } else if let Some(found) = table.other_format(dialect) {
             return Err(Location::file(file).at_line(table.line).error(other_format(found)));
         }
+        table.find_date_order(dialect);
         table.find_date_columns(dialect);
         if let [only] = table.header.as_slice()
             && let Some(found) = only.chars().find(|c| ";\t|".contains(*c))

@@ -68,7 +68,7 @@ pub(super) fn joint_warnings(section: &Section<'_, '_>) -> Vec<Warning> {
             }
         }
     }
-    for key in ["a_m", "d_m"] {
+    for key in ["a_m", "d_m", "min_m", "max_m"] {
         let Some(item) = section.peek(key) else { continue };
         let length = item.number().ok().filter(|length| length.abs() > MAX_PLAUSIBLE_LENGTH);
         if let Some(length) = length {

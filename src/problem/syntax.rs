@@ -44,7 +44,8 @@ impl Document {
         }
         let near_text: String =
             self.text.get(span.clone()).unwrap_or_default().trim().chars().take(40).collect();
-        let usual = usual_mistake(before_in_line, line_after, error.message());
+        let usual = foreign_comment(before_in_line, line_after)
+            .or_else(|| usual_mistake(before_in_line, line_after, error.message()));
         let single = single_brackets(previous_lines, before_in_line, line_after);
         let is_repeated = error.message().contains("duplicate key");
         let single = single.filter(|_| is_repeated);
@@ -152,12 +153,16 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
         return Some(mistake);
     }
     let is_digit = |character: char| character.is_ascii_digit();
+    let is_digits = |text: &str| !text.is_empty() && text.chars().all(is_digit);
     let digits_after = after.strip_prefix(',').filter(|_| before.ends_with(is_digit));
     let digits_after = digits_after.or_else(|| {
         Some(after)
             .filter(|_| before.trim_end_matches(',').ends_with(is_digit) && before.ends_with(','))
     });
-    let has_comma = digits_after.is_some_and(|next| next.starts_with(is_digit));
+    let pair = before.rsplit(['=', '{']).next().and_then(|value| value.trim().split_once(','));
+    let is_split = message.contains("inline table")
+        && pair.is_some_and(|(whole, rest)| [whole, rest].iter().all(|of| is_digits(of)));
+    let has_comma = is_split || digits_after.is_some_and(|next| next.starts_with(is_digit));
     let has_point =
         digits_after.is_some_and(|next| next.trim_start_matches(is_digit).starts_with('.'));
     let is_in_escape = (message.contains("escape") || message.contains("unicode"))
@@ -261,6 +266,21 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
     mistake.or_else(|| mistaken_form(before, after, message, word))
 }
 
+/// Returns the mistake that a comment of another language begins the line, or stands behind its value
+/// or header, at a place between `before` and `after`, with its remedy; `None` without one.
+fn foreign_comment(before: &str, after: &str) -> Option<(String, &'static str)> {
+    let is_mark = |text: &str| ["//", "/*", "--"].iter().any(|mark| text.starts_with(mark));
+    let word = after.split(' ').next().unwrap_or_default().trim_end_matches(',');
+    let is_value = word.parse::<f64>().is_ok() || ["true", "false"].contains(&word);
+    let has_value = is_value || !before.trim_end().ends_with(['=', '[', '{']);
+    let behind = after.strip_prefix(word).filter(|_| is_value).unwrap_or(after);
+    let behind = Some(behind.trim_start_matches([' ', '\t', ','])).filter(|_| has_value);
+    (is_mark(before.trim_start()) || behind.is_some_and(is_mark)).then(|| {
+        let remedy = "TOML has no // comments: begin them with #";
+        ("a comment of another language".to_owned(), remedy)
+    })
+}
+
 /// Returns a usual mistake in the form of a line with its remedy, at a place between `before` and
 /// `after` where the parser says `message`; `word` begins there.
 fn mistaken_form(
@@ -285,6 +305,8 @@ fn mistaken_form(
         && message.contains("expected newline")
         && !before.trim_end().ends_with('=');
     let has_no_equals = message.contains("key with no value");
+    let behind_comma = after.trim_start().strip_prefix(',').map(str::trim_start);
+    let is_last_comma = behind_comma.is_some_and(|rest| rest.is_empty() || rest.starts_with('#'));
     let mistakes = [
         (
             message.contains("invalid basic string") && message.contains("expected `\"`"),
@@ -297,6 +319,11 @@ fn mistaken_form(
             "write { free = true } to free parameters, { fixed = true } to hold them",
         ),
         (is_bare, "text without quotes", "text stands in quotes, as in kind = \"fixed\""),
+        (
+            is_last_comma && message.contains("expected newline"),
+            "a comma at the end of the line",
+            "remove the comma: what is on the next line needs none",
+        ),
         (
             has_values_behind,
             "several values or keys on one line",

@@ -1,4 +1,4 @@
-//! Units that files do not use, with their factors, for messages.
+//! Units that keys do not use, with their factors, for messages.
 
 use std::f64::consts::{PI, TAU};
 
@@ -73,7 +73,8 @@ mod tests {
             assert_eq!(unit.convert_foreign(suffix, value), converted, "{suffix}");
         }
         for (suffix, unit, _) in FOREIGN_UNITS {
-            assert!(unit.suffix(suffix).is_none(), "{suffix} is read");
+            let are_inches = unit.suffix(suffix).is_some_and(|read| read.name == "in");
+            assert!(unit.suffix(suffix).is_none() || are_inches, "{suffix} is read");
         }
     }
 }

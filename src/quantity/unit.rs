@@ -365,9 +365,12 @@ impl Unit {
         self.row().suffixes
     }
 
-    /// Returns the suffix called `name`, or `None` if files may not write this unit with it.
+    /// Returns the suffix called `name`, or `None` if files may not write this unit with it. Columns
+    /// of lengths may be in inches too, which no message proposes.
     pub(crate) fn suffix(self, name: &str) -> Option<Suffix> {
-        self.suffixes().iter().copied().find(|suffix| suffix.name == name)
+        let inches = Suffix { name: "in", to_si: |x| x * 0.0254 };
+        let of_columns = (self == Self::Length).then_some(inches);
+        self.suffixes().iter().copied().chain(of_columns).find(|suffix| suffix.name == name)
     }
 
     /// Returns the suffix of the SI unit.

@@ -6,8 +6,32 @@ use toml_edit::DocumentMut;
 
 use super::describe::{Description, HELD_OUT, SIGMA_MM, TOOL, parameters_of};
 use super::free::distinguishable_parameters;
-use crate::error::InputError;
+use crate::error::{InputError, WarningKind};
 use crate::problem::{JointKind, Problem};
+
+/// Returns the index of the first of the consecutively numbered `names` before which one is left out,
+/// with the warning about that; `None` if none is, or the numbers are not consecutive elsewhere.
+pub(super) fn left_out(names: &[&str]) -> Option<(usize, WarningKind)> {
+    let numbered = |name: &&str| {
+        let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        Some((letters.to_owned(), name.strip_prefix(letters)?.parse::<u32>().ok()?))
+    };
+    let numbered: Vec<(String, u32)> = names.iter().map(numbered).collect::<Option<_>>()?;
+    let steps = || numbered.iter().zip(numbered.iter().skip(1));
+    let is_next = |((before, one), (letters, other)): &(&(String, u32), &(String, u32)),
+                   by: u32| {
+        before == letters && one.checked_add(by) == Some(*other)
+    };
+    let consecutive = steps().filter(|pair| is_next(pair, 1)).count();
+    let place = steps().position(|pair| is_next(&pair, 2))?;
+    let (letters, number) = numbered.get(place)?;
+    let kind = WarningKind::JointLeftOut {
+        missing: format!("{letters}{}", number + 1),
+        before: format!("{letters}{}", number + 2),
+        joints: names.len(),
+    };
+    (consecutive > 0 && consecutive + 2 == numbered.len()).then_some((place + 1, kind))
+}
 
 /// Completes the `text` of a problem by the sections of tool, parameters and data that it lacks:
 /// priors for all parameters, except those which positions cannot distinguish from others.
@@ -23,7 +47,9 @@ pub(crate) fn complete(problem: &Problem, text: &str) -> Result<Description, Inp
         let (name, text) = (problem.name.clone(), text.to_owned());
         return Ok(Description { name, text, notes: vec![note.to_owned()] });
     }
-    let mut notes = Vec::new();
+    let names: Vec<&str> = problem.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let mut notes: Vec<String> =
+        left_out(&names).map(|(_, kind)| kind.to_string()).into_iter().collect();
     let mut text = format!("{}\n", text.trim_end());
     if !has("tool") && !has("target") {
         text.push_str(TOOL);

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
+use super::sheet::left_out;
 use crate::error::{InputError, Location, UrdfErrorKind, Warning, WarningKind};
 use crate::problem::item::Document;
 use crate::problem::quoted;
@@ -118,6 +119,7 @@ pub(crate) fn text_of_table(file: &Path) -> Result<SheetTable, InputError> {
     };
     let mut out = format!("name = {}\n{form}\njoint = [\n", quoted(&name));
     let (mut lines, mut rows, mut longest) = (Vec::new(), Vec::new(), 0.0_f64);
+    let (mut names, has_names) = (Vec::new(), columns.iter().all(|column| column.place > 0));
     for record in reader.records() {
         let record = record.map_err(|error| bad(&error))?;
         let line = line(record.position());
@@ -167,7 +169,11 @@ pub(crate) fn text_of_table(file: &Path) -> Result<SheetTable, InputError> {
         let entries: Vec<String> = entries.chain(slides).collect();
         let _ = writeln!(out, "  {{ {} }},", entries.join(", "));
         lines.push(line);
+        names.extend(record.get(0).filter(|_| has_names).map(str::to_owned));
         rows.push(row);
+    }
+    if let Some((row, kind)) = left_out(&names.iter().map(String::as_str).collect::<Vec<_>>()) {
+        warnings.push(at(lines.get(row).copied().unwrap_or(header_line), kind));
     }
     if longest > 0.0 && longest < MAX_ASKED_MM {
         let kind = WarningKind::SheetInMetres { longest: longest.to_string() };

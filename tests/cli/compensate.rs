@@ -98,6 +98,25 @@ fn targets_in_another_unit_are_asked_about() {
     };
     assert!(warned(&|_, x| x / 1e3).contains("with metres instead of the declared millimetres"));
     assert!(!warned(&|_, x| x).contains("where their joint columns lead"));
+    // Positions under names that are not read do not turn silently into those of the joints.
+    let renamed = |unit: &str| {
+        let name = |of: &str| match places.iter().position(|&place| table.columns[place] == of) {
+            Some(axis) => format!("{}{unit}", ["X", "Y", "Z"][axis]),
+            None => of.to_owned(),
+        };
+        let header: Vec<String> = table.columns.iter().map(|of| name(of)).collect();
+        let rows = table.rows.iter().take(2).map(|row| row.join(",") + "\n");
+        folder.write("targets.csv", header.join(",") + "\n" + &rows.collect::<String>());
+        folder.flexcal("compensate . --estimate out/estimate.json --data targets.csv --out c")
+    };
+    let said = renamed(" (in)");
+    let map = "write columns = { \"X (in)\" = \"x_in\", \"Y (in)\" = \"y_in\", \"Z (in)\" = \"z_in\" } in [data]";
+    assert!(said.stderr.contains(map), "{}", said.stderr);
+    assert!(said.stdout.contains("Next: correct the table as the warning says"), "{}", said.stdout);
+    assert!(renamed("").stderr.contains("no positions are read"));
+    let said = renamed(" (cm)").code(2).stderr;
+    assert!(said.contains("convert the numbers: 1 cm is 10 mm"), "{said}");
+    assert!(!warned(&|_, x| x).contains("no positions are read"));
     // The estimate had payloads and hoist forces, which an elastic arm needs.
     let kept = |names: &[&str]| {
         let places: Vec<usize> = (0..table.columns.len())
@@ -180,6 +199,27 @@ fn targets_without_what_an_effect_follows_are_reached_without_it() {
         "{run:?}"
     );
     assert!(folder.has("there/commands.csv"), "{run:?}");
+}
+
+#[test]
+fn targets_without_the_approach_that_a_play_was_fitted_by_are_named() {
+    let folder = Folder::new();
+    for name in ["problem.toml", "measurements.csv"] {
+        folder.copy(&format!("problems/service-arm/{name}"), name);
+    }
+    let play = "\n[[effect]]\nbacklash = { joint = 2 }\n";
+    folder.write("problem.toml", folder.read("problem.toml") + play);
+    folder.flexcal("identify . --out out");
+    let table = folder.read("measurements.csv");
+    let said = |columns: usize| {
+        let row = |line: &str| line.split(',').take(columns).collect::<Vec<_>>().join(",") + "\n";
+        folder.write("targets.csv", table.lines().take(4).map(row).collect::<String>());
+        let command = "compensate . --estimate out/estimate.json --data targets.csv --out c";
+        folder.flexcal(command).stderr
+    };
+    let words = "the table has no columns approach1 …, and backlash was fitted by them";
+    assert!(said(11).contains(words), "{}", said(11));
+    assert!(!said(15).contains("approach1"), "{}", said(15));
 }
 
 #[test]

@@ -254,6 +254,7 @@ fn wrong_arguments_end_with_status_two_and_help_with_zero() {
         ("accept . --tolerance 0.2", "'--tolerance-mm'"),
         ("next . --estimate e.json", "tip: next takes no --estimate, because it fits by itself"),
         ("export . --estimate e.json", "<--urdf <ARM.urdf>|--format <FORMAT>>"),
+        ("compensate . --data t.csv", "flexcal identify writes estimate.json"),
         ("export . --estimate e.json", "the values of --format are ur-yaml, ros-yaml, mdh, dh"),
         ("export . --estimate e.json --format csv", "tip: mdh or dh write the table"),
         ("accept . --tolerance-mm -0.1", "--tolerance-mm is followed by -0.1"),

@@ -111,6 +111,12 @@ fn a_table_in_memory_is_read_as_the_file_is() {
         columns.iter_mut().find(|(column, _)| column == name).unwrap().1 = values;
         read(columns)
     };
+    let texts = in_memory().into_iter().map(|(name, values)| match &*name {
+        "x_mm" => (name, ColumnValues::Words(vec!["1874,383"; memory.len()].into_iter().collect())),
+        _ => (name, values),
+    });
+    let said = read(texts.collect()).unwrap_err().to_string();
+    assert!(said.contains("is a text, not a number") && said.contains("read_csv"), "{said}");
     let replaced = |name: &str, values| with(name, values).unwrap_err().to_string();
     let numbers = |row: usize, value: f64| {
         let mut numbers = vec![0.5; 78];
@@ -132,7 +138,7 @@ fn a_table_in_memory_is_read_as_the_file_is() {
         (replaced("z_mm", words(3, "")), "memory:5: column z_mm: the cell is empty"),
         (
             replaced("z_mm", ColumnValues::Numbers(vec![0.0])),
-            "memory: column z_mm: 1 values for 78 rows",
+            "memory: column z_mm: 1 values, and 78 in the first column",
         ),
     ];
     for (found, expected) in told {

@@ -78,6 +78,12 @@ fn dates_may_begin_with_the_day() {
         &["05/06/2024 02:03:20 PM is read month first, as 2024-05-06"],
     );
     assert_eq!(warnings("05/31/2024 02:03:20 PM"), "");
+    // Dates of another column say nothing of the order in the times.
+    let lot = table("05/06/2024 14:03:20")
+        .replace("time\n1", "time,lot\n1")
+        .replace(":20\n", ":20,13/02/24\n");
+    let error = read("", &lot).unwrap_err();
+    assert_says(&error, &["day and month may stand in either order"]);
     // Where decimals have commas, the day stands first.
     let table = |date: &str| format!("A1;A2;X;Y;Z;temp;time\n1,5;2;3;4;5;20;{date} 14:03:20\n");
     let (rows, warnings) = read(MAP, &table("09/11/2026")).unwrap();
@@ -194,6 +200,11 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
     assert_says(&narrow, &["tolerance_s is too small", "write tolerance_s = 0.60 in joints"]);
     let twice = error(tracker, &log.replace("P2", "P1"));
     assert_says(&twice, &["controller.csv:3: column Point: the pose P1 is already on line 2"]);
+    let (first, second) = (log.lines().nth(1).unwrap(), log.lines().nth(2).unwrap());
+    let home = |row: &str| row.replace("P1", "HOME").replace("P2", "HOME") + "\n";
+    assert!(
+        joined("by = 'name'", tracker, &(log.to_owned() + &home(first) + &home(second))).is_ok()
+    );
 }
 
 #[test]

@@ -52,6 +52,31 @@ fn dates_of_the_joint_table_are_times_under_either_name() {
 }
 
 #[test]
+fn a_map_the_wrong_way_round_and_times_without_a_name_are_named_in_joint_tables() {
+    let problem = |map: &str| {
+        format!(
+            "{ARM}[data]\nfiles = ['tracker.txt']\njoints = {{ files = ['log.csv'], by = 'time' }}\n\
+             [data.columns]\n{map}[data.format]\ndecimal = ','\n"
+        )
+    };
+    let error = |map: &str| {
+        let (problem, log) = (problem(map), LOG.replace("Stamp;Name", "Name;Stamp"));
+        let log = log.replace("2026-03-11 09:15:30;P1", "P1;2026-03-11 09:15:30");
+        let folder = Folder::with([
+            ("problem.toml", &*problem),
+            ("tracker.txt", TRACKER),
+            ("log.csv", &log),
+        ]);
+        let problem = Problem::read(&folder.path("problem.toml")).unwrap();
+        Measurements::read(&problem.data.files, &problem).unwrap_err()
+    };
+    let turned = "'time' = 'Stamp'\n'q1_deg' = 'A1'\n'q2_deg' = 'A2'\n'x_mm' = 'X'\n";
+    assert_says(&error(turned), &["theirs = ours, and \"q1_deg\" is a name of flexcal"]);
+    let named = "'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n";
+    assert_says(&error(named), &["column time_s or time: missing", "\"Stamp\" = \"time"]);
+}
+
+#[test]
 fn dates_are_paired_with_milliseconds_since_the_start_of_a_controller() {
     let second = |k: u32| 20 * k + k * k % 13;
     let date = |k: u32| format!("2026-03-11T09:{:02}:{:02}Z", second(k) / 60, second(k) % 60);

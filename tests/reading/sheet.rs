@@ -79,6 +79,46 @@ fn a_data_sheet_may_be_a_table_with_units_in_its_header() {
 }
 
 #[test]
+fn a_joint_left_out_of_a_data_sheet_is_named() {
+    let rows = |names: &[&str]| {
+        let row = |name: &&str| format!("{name},0,400,0,90\n");
+        "joint,theta_deg,d_mm,a_mm,alpha_deg\n".to_owned()
+            + &names.iter().map(row).collect::<String>()
+    };
+    let folder = Folder::with([("sheet.csv", "")]);
+    let said = |names: &[&str]| {
+        folder.write("sheet.csv", rows(names));
+        folder.flexcal("init sheet.csv --out arm").success().stderr
+    };
+    for names in [&["1", "2", "4"][..], &["joint1", "joint2", "joint4", "joint5"]] {
+        let words =
+            ["sheet.csv:4: the row of ", "3 seems to be missing before ", " joints; add it"];
+        assert_contains(&said(names), &words);
+    }
+    for names in [&["1", "2", "3"][..], &["J2", "J3", "J4"], &["10", "12", "14"], &["a1", "b3"]] {
+        assert!(!said(names).contains("missing"), "{names:?}");
+    }
+    let joints = "name = 'arm'\n[[joint]]\nname = 'A1'\nd_m = 1\n[[joint]]\nname = 'A2'\na_m = 1\n\
+                  [[joint]]\nname = 'A4'\na_m = 1\n";
+    folder.write("sheet.toml", joints);
+    let run = folder.flexcal("init sheet.toml --out other").success();
+    assert_contains(&(run.stdout + &run.stderr), &["the row of A3 seems to be missing before A4"]);
+}
+
+#[test]
+fn sheets_of_one_name_in_two_folders_do_not_replace_each_other_silently() {
+    let sheet = "theta_deg,d_mm,alpha_deg\n0,400,0\n";
+    let folder = Folder::with([("datasheet.csv", sheet)]);
+    folder.write("b/datasheet.csv", sheet.replace("400", "500"));
+    let said = |command: &str| folder.flexcal(command).success().stderr;
+    assert!(!said("init datasheet.csv").contains("replaced"));
+    assert!(!said("init ./datasheet.csv").contains("replaced"));
+    let words = "problem.toml made of another file is replaced; --out keeps both";
+    assert_contains(&said("init b/datasheet.csv"), &[words]);
+    assert_contains(&said("init datasheet.csv"), &[words]);
+}
+
+#[test]
 fn a_data_sheet_may_have_accents_and_names_what_is_not_read() {
     let rows = "1,90,0,9,8,-20,30,v,-90\n2,0,450,9,8,-20,30,v,-90\n";
     let folder = Folder::with([("sheet.csv", "")]);

@@ -202,7 +202,27 @@ fn limits_in_another_unit_are_asked_about() {
     let expected = WarningKind::AngleLooksLikeDegrees { what: "a limit", turns, write };
     let kinds: Vec<_> = arm.plausibility_warnings().into_iter().map(|of| of.kind).collect();
     assert_eq!(kinds, [expected]);
+    let long = parse(&format!("{ARM}kind = 'prismatic'\nmax_m = 500\n"));
+    let words = long.plausibility_warnings().iter().map(ToString::to_string).collect::<Vec<_>>();
+    assert!(words[0].contains("joint[1].max_m: 500 m is long"), "{words:?}");
     let rail = format!("{ARM}kind = 'prismatic'\nmin_m = 0\nmax_m = 6\n");
+    let said = |arm: &str, unit: &str, most: f64| {
+        let row = |k: u32| format!("{},{k},2,3\n", most * f64::from(k) / 11.0);
+        let rows: String = (0..12).map(row).collect();
+        let table = format!("q1_{unit},x_mm,y_mm,z_mm\n{rows}");
+        let (_, warnings) = try_table(&parse(arm), &table).unwrap();
+        warnings.iter().map(|of| of.kind.to_string()).collect::<Vec<_>>().join("; ")
+    };
+    let free = format!("{ARM}kind = 'prismatic'\n");
+    for (arm, unit, most, words) in [
+        (&free, "m", 450.0, "column is 450 m, much for this joint; if they are in millimetres"),
+        (&rail, "mm", 4.5, "column is 4.5 mm, little for this joint; if they are in metres"),
+    ] {
+        assert!(said(arm, unit, most).contains(words), "{}", said(arm, unit, most));
+    }
+    for (arm, unit, most) in [(&free, "m", 4.5), (&free, "mm", 0.5), (&rail, "mm", 4500.0)] {
+        assert!(!said(arm, unit, most).contains("for this joint"), "{unit}");
+    }
     for (command, expected) in [("5994.3", Some("999 times the limit")), ("6.3", None)] {
         let table = format!("q1_m,x_mm,y_mm,z_mm\n{command},1,2,3\n");
         let (_, warnings) = try_table(&parse(&rail), &table).unwrap();
