@@ -11,6 +11,7 @@ use super::clocks::{
 use super::headerless::{holds_numbers, no_header};
 use super::instants::is_clock;
 use super::join_key::{Key, name_column, time_key};
+use super::joined_row::LogRow;
 use super::mapped::Names;
 use super::meaning::is_numbered_or_position;
 use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
@@ -45,6 +46,8 @@ pub(super) struct JoinedLog {
     rows: Vec<LogRow>,
     /// Index of the row with each name, for a join by name.
     of_name: HashMap<String, usize>,
+    /// Error of each name that several rows have, for measured rows that ask for it.
+    repeated: HashMap<String, InputError>,
     /// Row indices in the order of their times, for a join by time.
     by_time: Vec<usize>,
     /// Times of the rows in ascending order, on the clock of the measurements \[s\].
@@ -75,21 +78,12 @@ pub(super) struct JoinedLog {
     timed_pairs: Vec<TimedPair>,
 }
 
-/// Row of the joint table.
-struct LogRow {
-    source: JointRow,
-    /// Time of the row \[s\], for a join by time on the clock of the measurements; else NaN.
-    time: f64,
-    /// Number of measured rows whose partner this row is.
-    uses: usize,
-}
-
 impl JoinedLog {
     /// Reads the joint table that the problem declares.
     ///
     /// # Errors
     /// Returns an error if a file cannot be read, its columns differ from those of the first, the
-    /// key column is missing, or a name occurs twice.
+    /// key column is missing.
     pub fn read(log: &JointLog, problem: &Problem) -> Result<Self, InputError> {
         let dialect = &problem.data.dialect;
         let mut joined = Self { rule: log.by, location: log.location.clone(), ..Self::default() };
@@ -139,10 +133,12 @@ impl JoinedLog {
                     let name = table.name(key.place)?.to_owned();
                     if let Some(&first) = self.of_name.get(&name) {
                         let line = self.rows.get(first).map_or(0, |row| row.source.line);
-                        let kind = TableErrorKind::RepeatedPose { name, line };
-                        return Err(table.cell_error(key.place, kind));
+                        let timed = time_key(&self.names).is_some();
+                        let kind = TableErrorKind::RepeatedPose { name: name.clone(), line, timed };
+                        self.repeated.entry(name).or_insert(table.cell_error(key.place, kind));
+                    } else {
+                        self.of_name.insert(name, self.rows.len());
                     }
-                    self.of_name.insert(name, self.rows.len());
                 }
                 _ => {
                     let of_row = clock.and_then(|key| table.time(key.place, key.to_si).ok());
@@ -220,11 +216,15 @@ impl JoinedLog {
     /// has no partner.
     ///
     /// # Errors
-    /// Returns an error if the key cell of the row is empty or invalid.
+    /// Returns an error if the key cell of the row is empty or invalid, or if several joint rows have
+    /// its name.
     pub fn complete(&mut self, table: &mut Table) -> Result<bool, InputError> {
         let partner = match (self.rule, self.key) {
             (JoinRule::Name, Some(key)) => {
                 let name = table.name(key.place)?;
+                if let Some(error) = self.repeated.remove(name) {
+                    return Err(error);
+                }
                 let partner = self.of_name.get(name).copied();
                 if partner.is_none() {
                     self.unpaired_names.push(name.to_owned());
@@ -260,7 +260,7 @@ impl JoinedLog {
             && let Ok(measured) = table.time(clock.place, clock.to_si)
         {
             let place = Location::file(&table.file).at_line(table.line());
-            let log_place = Location::file(&row.source.file).at_line(row.source.line);
+            let log_place = row.place();
             self.timed_pairs.push(TimedPair { measured, logged: row.time, place, log_place });
         }
         table.append_row(&row.source);
@@ -406,7 +406,7 @@ impl JoinedLog {
             return Ok(());
         }
         if let Some(row) = self.common_partner() {
-            let partner = Location::file(&row.source.file).at_line(row.source.line).to_string();
+            let partner = row.place().to_string();
             let keys = self.keys().map(Box::new);
             let same = row.uses;
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
@@ -473,8 +473,7 @@ impl JoinedLog {
         self.check_pairing()?;
         let is_unused = |row: &&LogRow| row.uses == 0 && self.rule == JoinRule::Name;
         let unused = self.rows.iter().filter(is_unused);
-        let place = |row: &LogRow| Location::file(&row.source.file).at_line(row.source.line);
-        let unused: Vec<_> = unused.map(place).collect();
+        let unused: Vec<_> = unused.map(LogRow::place).collect();
         // Measured rows are listed, because they are lost; unused joint rows are only counted.
         let pairs = same_but_for_spelling(&self.unpaired_names, self.unused_names());
         let alike = pairs.first().map(|&pair| (pairs.len(), quoted(pair)));
