@@ -211,6 +211,7 @@ class Identification(Fit, Forward):
         """
         poses, shape = self._poses((q, q_rad, q_deg), columns)
         positions = np.frombuffer(self._forward.predict(poses), dtype=np.float64).reshape(-1, 3)
+        warn(self._core.unknown_sides(poses), stacklevel=2)
 
         def bounded(level: float) -> _Bounded | None:
             parts = self._core.predict_bounded(poses, level)

@@ -207,6 +207,15 @@ impl Identification {
         )))
     }
 
+    /// Warnings about directions of approach that poses do not state although effects depend on them.
+    fn unknown_sides(&self, py: Python<'_>, poses: &Poses) -> PyResult<Vec<String>> {
+        let sides = detached(py, || {
+            let sides = remainder::sides_of(&self.found, &self.problem, &poses.rows)?;
+            Ok(report::unknown_sides(&sides, true).into_iter().collect())
+        })?;
+        sides.map_err(|error: IdentifyError| raised(&error))
+    }
+
     /// Pages and figures.
     fn report(&self, py: Python<'_>) -> PyResult<Pages> {
         detached(py, || {

@@ -84,8 +84,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let (prediction, bounds) = match (&estimate, &correction) {
         (Some(estimate), Some(correction)) => {
-            let CorrectedPrediction { prediction, poses } =
+            let CorrectedPrediction { prediction, poses, sides } =
                 remainder::predict(&problem, estimate, correction, &rows, split.as_ref())?;
+            common.hint(report::unknown_sides(&sides, true));
             let bounds = Bounds::new(correction, poses, arguments.level);
             (prediction, Some(bounds.with_misfit(estimate.misfit)))
         }

@@ -35,9 +35,11 @@ pub enum TableErrorKind {
     #[error("the file is empty; it begins with a header line such as q1_deg,x_mm,y_mm,z_mm")]
     EmptyTable,
     #[error(
-        "the pose {name} is already on line {line}; name each pose of the joint table differently"
+        "the pose {name} is already on line {line}, and a measured row asks for it; name each pose of \
+         the joint table differently{}",
+        if *timed { ", or pair by times if the measurements have them, too: by = \"time\"" } else { "" }
     )]
-    RepeatedPose { name: String, line: usize },
+    RepeatedPose { name: String, line: usize, timed: bool },
     #[error(
         "no row of the measurements has a partner in the joint table{}{}{}",
         nearest_in_time_hint(gap.as_deref()),

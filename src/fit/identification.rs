@@ -358,6 +358,7 @@ fn fit_rows(
             Vec::new()
         },
         start_times: measurements.start_times(),
+        has_approach: measurements.approach.is_some(),
         sigma: fitting.sigma,
         seconds: clock.elapsed().as_secs_f64(),
     })

@@ -182,6 +182,8 @@ pub struct Identification {
     pub(crate) fitted_rows: Vec<String>,
     /// Start time of each session, relative to which time-dependent terms are evaluated.
     pub(crate) start_times: StartTimes,
+    /// True if the rows have directions of approach.
+    pub(crate) has_approach: bool,
     /// Standard deviation (1 σ) of a coordinate in rows that state none, declared or estimated
     /// \[m\].
     pub sigma: f64,

@@ -200,8 +200,18 @@ impl Effect {
 
     /// Returns true if the effect depends on directions of approach.
     pub(crate) fn has_sides(&self) -> bool {
+        self.is_play() || self.depends_on(Quantity::has_sides)
+    }
+
+    /// Returns true if the effect is the play of a joint, which the moment of the loads takes up
+    /// without directions of approach.
+    pub(crate) fn is_play(&self) -> bool {
         self.acts_at(At::JointOrSlide(JointField::Play, JointField::SlidingPlay))
-            || self.depends_on(Quantity::has_sides)
+    }
+
+    /// Returns true if friction alone makes the effect depend on directions of approach.
+    pub(crate) fn is_friction_alone(&self) -> bool {
+        !self.is_play() && !self.depends_on(|quantity| matches!(quantity, Quantity::Approach(_)))
     }
 
     /// Returns true if the effect depends on time or the order of the poses, rather than on

@@ -10,6 +10,7 @@ use super::clocks::{
 };
 use super::instants::is_clock;
 use super::join_key::{Key, find_key, name_column, time_key};
+use super::joined_row::LogRow;
 use super::mapped::Names;
 use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
 use super::spelling::{misplaced, quoted, same_but_for_spelling, usual_difference};
@@ -43,7 +44,7 @@ pub(super) struct JoinedLog {
     rows: Vec<LogRow>,
     /// Index of the row with each name, for a join by name.
     of_name: HashMap<String, usize>,
-    /// Errors of the names that several rows have, which only a measured row with the name reports.
+    /// Error of each name that several rows have, for measured rows that ask for it.
     repeated: HashMap<String, InputError>,
     /// Row indices in the order of their times, for a join by time.
     by_time: Vec<usize>,
@@ -73,15 +74,6 @@ pub(super) struct JoinedLog {
     clock: Option<Key>,
     /// Times of the pairs that are not joined by name.
     timed_pairs: Vec<TimedPair>,
-}
-
-/// Row of the joint table.
-struct LogRow {
-    source: JointRow,
-    /// Time of the row \[s\], for a join by time on the clock of the measurements; else NaN.
-    time: f64,
-    /// Number of measured rows whose partner this row is.
-    uses: usize,
 }
 
 impl JoinedLog {
@@ -139,9 +131,9 @@ impl JoinedLog {
                     let name = table.name(key.place)?.to_owned();
                     if let Some(&first) = self.of_name.get(&name) {
                         let line = self.rows.get(first).map_or(0, |row| row.source.line);
-                        let kind = TableErrorKind::RepeatedPose { name: name.clone(), line };
-                        let error = table.cell_error(key.place, kind);
-                        self.repeated.entry(name).or_insert(error);
+                        let timed = time_key(&self.names).is_some();
+                        let kind = TableErrorKind::RepeatedPose { name: name.clone(), line, timed };
+                        self.repeated.entry(name).or_insert(table.cell_error(key.place, kind));
                     } else {
                         self.of_name.insert(name, self.rows.len());
                     }
@@ -199,7 +191,8 @@ impl JoinedLog {
     /// has no partner.
     ///
     /// # Errors
-    /// Returns an error if the key cell of the row is empty or invalid.
+    /// Returns an error if the key cell of the row is empty or invalid, or if several joint rows have
+    /// its name.
     pub fn complete(&mut self, table: &mut Table) -> Result<bool, InputError> {
         let partner = match (self.rule, self.key) {
             (JoinRule::Name, Some(key)) => {
@@ -242,7 +235,7 @@ impl JoinedLog {
             && let Ok(measured) = table.time(clock.place, clock.to_si)
         {
             let place = Location::file(&table.file).at_line(table.line());
-            let log_place = Location::file(&row.source.file).at_line(row.source.line);
+            let log_place = row.place();
             self.timed_pairs.push(TimedPair { measured, logged: row.time, place, log_place });
         }
         table.append_row(&row.source);
@@ -388,7 +381,7 @@ impl JoinedLog {
             return Ok(());
         }
         if let Some(row) = self.common_partner() {
-            let partner = Location::file(&row.source.file).at_line(row.source.line).to_string();
+            let partner = row.place().to_string();
             let keys = self.keys().map(Box::new);
             let same = row.uses;
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
@@ -455,8 +448,7 @@ impl JoinedLog {
         self.check_pairing()?;
         let is_unused = |row: &&LogRow| row.uses == 0 && self.rule == JoinRule::Name;
         let unused = self.rows.iter().filter(is_unused);
-        let place = |row: &LogRow| Location::file(&row.source.file).at_line(row.source.line);
-        let unused: Vec<_> = unused.map(place).collect();
+        let unused: Vec<_> = unused.map(LogRow::place).collect();
         // Measured rows are listed, because they are lost; unused joint rows are only counted.
         let pairs = same_but_for_spelling(&self.unpaired_names, self.unused_names());
         let alike = pairs.first().map(|&pair| (pairs.len(), quoted(pair)));

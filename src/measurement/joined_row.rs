@@ -1,9 +1,26 @@
-//! Rows of a table with the cells of a row of the joint table behind their own.
+//! Rows of a joint table, and rows of a table with the cells of a row of the joint table behind their own.
 
 use std::path::Path;
 
 use super::appended::{Appended, JointRow, JointTableFormat};
 use super::table::Table;
+use crate::error::Location;
+
+/// Row of the joint table.
+pub(super) struct LogRow {
+    pub source: JointRow,
+    /// Time of the row \[s\], for a join by time on the clock of the measurements; else NaN.
+    pub time: f64,
+    /// Number of measured rows whose partner this row is.
+    pub uses: usize,
+}
+
+impl LogRow {
+    /// Returns the place of the row in its file.
+    pub fn place(&self) -> Location {
+        Location::file(&self.source.file).at_line(self.source.line)
+    }
+}
 
 impl Table {
     /// Returns the format of the table as one whose columns are appended to another table.

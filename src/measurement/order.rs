@@ -1,5 +1,6 @@
 //! Order in which the rows were measured within their sessions, and the past of each pose.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
@@ -127,6 +128,16 @@ impl Measurements {
             sorted: Some(sorted.clone().unwrap_or_else(columns)),
         };
         Self { order: RowOrder(OnceLock::from(order)), ..self.select(rows) }
+    }
+
+    /// Returns the rows with directions of approach, all unknown (0) if the table has none, for an
+    /// arm whose fitted rows `had` them. Without the column the moment of the loads would decide on
+    /// which side of its play a joint rests.
+    pub(crate) fn with_sides(&self, had: bool) -> Cow<'_, Self> {
+        if !had || self.approach.is_some() {
+            return Cow::Borrowed(self);
+        }
+        Cow::Owned(Self { approach: Some(vec![0.0; self.configurations.len()]), ..self.clone() })
     }
 
     /// Returns the columns on which the past of a pose depends, in the order of the rows.

@@ -6,6 +6,7 @@ use nalgebra::{DVector, Vector3};
 use super::correction::{CorrectedPose, Correction};
 use super::linearise::timed_poses;
 use super::residuals::{in_measuring_frame, of_positions};
+use super::uncorrected::{Uncorrected, unknown_sides, widen};
 use crate::fit::{
     self, Command, Identification, IdentifyError, Placement, PredictError, Prediction,
     SavedEstimate, StageError,
@@ -29,6 +30,9 @@ pub struct CorrectedPrediction {
     pub prediction: Prediction,
     /// Correction and uncertainty of each row.
     pub poses: Vec<CorrectedPose>,
+    /// Effects that depend on directions of approach that rows do not state. The uncertainty of
+    /// these rows includes them.
+    pub sides: Vec<Uncorrected>,
 }
 
 /// Predicts `rows` as [`fit::predict`] does, and adds the correction to the positions.
@@ -45,6 +49,7 @@ pub fn predict(
     rows: &Measurements,
     split: Option<&Split>,
 ) -> Result<CorrectedPrediction, PredictError> {
+    let rows = &*rows.with_sides(estimate.has_approach);
     let placement = Placement::of(rows);
     let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let unseen = correction.unseen_placements(&model);
@@ -63,9 +68,11 @@ pub fn predict(
     estimate.count_time_in(&placement, &mut poses);
     let is_placed = |k: &usize| prediction.placed.contains(&model.parameters[*k].name);
     let placed: Vec<usize> = (0..model.parameters.len()).filter(is_placed).collect();
-    let corrected = correction.at((problem, &model, &prediction.x), &placed, &poses);
+    let mut corrected = correction.at((problem, &model, &prediction.x), &placed, &poses);
+    let sides = unknown_sides((problem, &model), prediction.x.as_slice(), &poses);
+    widen(&mut corrected, &sides);
     if !correction.has_remainder() {
-        return Ok(CorrectedPrediction { prediction, poses: corrected });
+        return Ok(CorrectedPrediction { prediction, poses: corrected, sides });
     }
     let mut shifts: Vec<Vector3<f64>> = corrected.iter().map(|pose| pose.shift).collect();
     let measured = of_positions(rows, &shifts);
@@ -78,7 +85,7 @@ pub fn predict(
     for (residual, shift) in prediction.residuals.iter_mut().flatten().zip(&measured) {
         residual.predicted += shift;
     }
-    Ok(CorrectedPrediction { prediction, poses: corrected })
+    Ok(CorrectedPrediction { prediction, poses: corrected, sides })
 }
 
 /// Predicts positions of `rows` as [`Identification::predict`] does, and adds the correction. Also
@@ -92,15 +99,35 @@ pub fn predict_identified(
     correction: &Correction,
     rows: &Measurements,
 ) -> Result<(Vec<Vector3<f64>>, Vec<CorrectedPose>), IdentifyError> {
+    let rows = &*rows.with_sides(found.has_approach);
     let mut positions = found.predict(problem, rows)?;
     let model = found.model(problem, &Placement::of(rows))?;
     let every_row: Vec<usize> = (0..rows.len()).collect();
     let poses = timed_poses(rows, &every_row, (correction.sigma, &found.start_times));
-    let corrected = correction.at((problem, &model, &found.vector(&model)?), &[], &poses);
+    let x = found.vector(&model)?;
+    let mut corrected = correction.at((problem, &model, &x), &[], &poses);
+    widen(&mut corrected, &unknown_sides((problem, &model), x.as_slice(), &poses));
     for (position, pose) in positions.iter_mut().zip(&corrected) {
         *position += pose.shift;
     }
     Ok((positions, corrected))
+}
+
+/// Returns the effects of an identified arm that depend on directions of approach which `rows` do not
+/// state.
+///
+/// # Errors
+/// Returns the errors of [`Identification::predict`].
+pub fn sides_of(
+    found: &Identification,
+    problem: &Problem,
+    rows: &Measurements,
+) -> Result<Vec<Uncorrected>, IdentifyError> {
+    let rows = &*rows.with_sides(found.has_approach);
+    let model = found.model(problem, &Placement::of(rows))?;
+    let every_row: Vec<usize> = (0..rows.len()).collect();
+    let poses = timed_poses(rows, &every_row, (1.0, &found.start_times));
+    Ok(unknown_sides((problem, &model), found.vector(&model)?.as_slice(), &poses))
 }
 
 /// Returns the rows with `shifts` \[m\] subtracted from their positions, as if the arm had no such

@@ -100,10 +100,11 @@ impl Bounds {
     pub fn new(correction: &Correction, mut poses: Vec<CorrectedPose>, level: f64) -> Self {
         let scores = &correction.scores;
         let factor = scores.quantile(level);
-        let lengths = poses.iter().map(|pose| factor * pose.size).collect();
+        let lengths = poses.iter().map(|pose| factor * pose.size + pose.aside).collect();
         let scale = scores.scale().unwrap_or(1.0);
         for pose in &mut poses {
             pose.covariance *= scale * scale;
+            pose.size = pose.size.hypot(pose.aside / scale);
         }
         Self { level, poses, lengths, scale, learned_from: scores.configurations, misfit: None }
     }
@@ -262,6 +263,7 @@ mod tests {
             shift: Vector3::zeros(),
             covariance: Matrix3::zeros(),
             size: 1.0,
+            aside: 0.0,
             is_extrapolated: false,
         };
         let bound = |share: f64, difference: f64| {

@@ -1,17 +1,17 @@
 //! Commands of an identified arm for a table of targets.
 
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 
 use super::apply::compensate;
 use super::bounds::Bounds;
 use super::correction::Correction;
 use super::rivals::Rival;
-use super::uncorrected::{Uncorrected, uncorrected};
+use super::uncorrected::{Uncorrected, uncorrected, unknown_sides};
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::{self, Command, Placement, SavedEstimate, SavedEstimateError, StageError};
 use crate::measurement::Measurements;
 use crate::model::Model;
-use crate::problem::Problem;
+use crate::problem::{LazyPast, Problem};
 
 /// Largest probability that another effect acts than the declared one, with which bounds are
 /// computed.
@@ -42,7 +42,8 @@ pub struct Compensation {
     /// move the arm \[m\]; the bounds include it. Empty without such effects.
     pub differences: Vec<f64>,
     /// Declared effects of the instrument, by which the commands are not corrected. The bounds
-    /// include that the arm or its base moves by them instead.
+    /// include that the arm or its base moves by them instead. Also effects that depend on
+    /// directions of approach that the targets do not state, which the bounds include.
     pub uncorrected: Vec<Uncorrected>,
 }
 
@@ -77,7 +78,7 @@ impl Compensation {
         frame: TargetFrame,
         level: f64,
     ) -> Result<Self, CompensationError> {
-        let targets = targets.arm_rows();
+        let targets = targets.arm_rows().with_sides(estimate.has_approach).into_owned();
         if let Some(row) = (0..targets.len()).find(|&row| !targets.observation(row).is_position()) {
             return Err(targets.location(row).error(InputErrorKind::NoTarget).into());
         }
@@ -115,7 +116,8 @@ impl Compensation {
         // Where the arm is meant to be is told by the instrument, or relative to the base.
         let placed = if is_seen { targets.clone() } else { fit::seen_in_base(&model, &x, &sought) };
         let fitted = (estimate, &x);
-        let uncorrected = uncorrected((problem, &model), fitted, (&placed, is_seen));
+        let mut uncorrected = uncorrected((problem, &model), fitted, (&placed, is_seen));
+        uncorrected.extend(sides_of_commands((problem, &model), &x, (&sought, &commands)));
         let mut differences = vec![0.0_f64; if rivals.is_empty() { 0 } else { placed.len() }];
         for rival in rivals {
             let rival = rival.differences(problem, &placed)?;
@@ -137,8 +139,10 @@ impl Compensation {
         };
         let bounds = bounds.map(|bounds| {
             let whole = |target: usize| {
-                let of_target = uncorrected.iter().filter(|of| of.is_bounded);
-                of_target.map(|of| of.differences[target]).sum::<Vector3<f64>>().norm()
+                let bounded = uncorrected.iter().filter(|of| of.is_bounded);
+                let (sides, others): (Vec<_>, Vec<_>) = bounded.partition(|of| of.side.is_some());
+                let sides = sides.iter().map(|of| of.differences[target].norm()).sum::<f64>();
+                sides + others.iter().map(|of| of.differences[target]).sum::<Vector3<f64>>().norm()
             };
             let whole: Vec<f64> = (0..placed.len()).map(whole).collect();
             bounds.with_uncorrected(&whole).with_misfit(estimate.misfit)
@@ -151,4 +155,20 @@ impl Compensation {
     pub fn reaches_all(&self) -> bool {
         self.commands.iter().all(Command::is_reached)
     }
+}
+
+/// Returns the effects of unknown directions of approach at the commands for `targets`, which have
+/// no earlier poses.
+fn sides_of_commands(
+    (problem, model): (&Problem, &Model),
+    x: &DVector<f64>,
+    (targets, commands): (&Measurements, &[Command]),
+) -> Vec<Uncorrected> {
+    let every_row: Vec<usize> = (0..targets.len()).collect();
+    let mut poses = Placement::of(targets).poses(targets, &every_row, 1.0);
+    for (pose, command) in poses.iter_mut().zip(commands) {
+        pose.setup.past = LazyPast::default();
+        pose.setup.configuration = &command.configuration;
+    }
+    unknown_sides((problem, model), x.as_slice(), &poses)
 }

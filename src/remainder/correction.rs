@@ -77,6 +77,8 @@ pub struct CorrectedPose {
     /// Expected root mean square of the error length ‖measured − predicted‖ \[m\]. Multiplied by
     /// `Scores::quantile`, it is an error bound.
     pub size: f64,
+    /// Distance \[m\] by which unknown directions of approach may move the position, to either side.
+    pub aside: f64,
     /// True if an input of the pose is outside its measured range. Also true if less than half of
     /// the correction is applied, because measured poses are far away.
     pub is_extrapolated: bool,
@@ -293,6 +295,7 @@ impl Correction {
                     .add_scalar(blank),
                 covariance: (covariance + Matrix3::from_diagonal(&added)).add_scalar(blank),
                 size: expected_size(variance.sum(), missed) + blank,
+                aside: 0.0,
                 is_extrapolated: (has_remainder && share < MIN_SHARE)
                     || self.is_outside(&poses[row].setup),
             }

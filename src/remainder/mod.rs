@@ -51,7 +51,7 @@ pub(crate) use saved::{FORMAT, SavedRemainder};
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
-    apply::{compensate, predict_identified},
+    apply::{compensate, predict_identified, sides_of},
     bounds::{BoundTest, Bounds, Compared},
     compensation::{Compensation, CompensationError, TargetFrame},
     declared::{declared, of_estimate},

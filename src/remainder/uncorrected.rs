@@ -2,17 +2,19 @@
 
 use nalgebra::{DVector, Vector3};
 
+use super::correction::CorrectedPose;
 use crate::fit::{Placement, PredictError, Prediction, SavedEstimate};
 use crate::measurement::Measurements;
-use crate::model::Model;
 use crate::model::parameter::ParameterSite;
-use crate::problem::{Effect, Problem};
+use crate::model::{Model, Pose};
+use crate::problem::{Effect, PoseView, Problem};
 
 /// Largest distance between the reading of a row's position and the predicted reading, at which the
 /// position is that of a target of the same model \[m\]. Tables round positions to 0.1 µm.
 const MAX_ROUNDING: f64 = 1e-6;
 
-/// Declared effect of the instrument, by which commands are not corrected.
+/// Declared effect by which commands are not corrected: one of the instrument, or one whose sign is
+/// that of an unknown direction of approach.
 #[derive(Debug, Clone)]
 pub struct Uncorrected {
     /// Effect as declared.
@@ -20,6 +22,9 @@ pub struct Uncorrected {
     /// For each target, how far the arm would stay from it \[m\] if the arm or its base moved by the
     /// effect, and not the readings.
     pub differences: Vec<Vector3<f64>>,
+    /// Joint whose direction of approach, which decides on the sign of the differences, is not known;
+    /// `None` for an effect of the instrument.
+    pub side: Option<usize>,
     /// True if a motion of the base reads exactly alike, and bounds include the differences. Effects
     /// that change lengths are told from lengths of the arm by priors and other rows.
     pub is_bounded: bool,
@@ -70,11 +75,77 @@ pub(super) fn uncorrected(
         let differences = model.reading_errors(&alone, &poses, &targets.positions);
         let acts = differences.iter().any(|difference| difference.norm() > 0.0);
         let is_bounded = !changes_lengths(effect, problem);
-        acts.then(|| Uncorrected { effect: effect.clone(), differences, is_bounded })
+        acts.then(|| Uncorrected { effect: effect.clone(), differences, side: None, is_bounded })
     };
     let effects = problem.effects.iter().map(|declared| &declared.effect);
     let counted = effects.filter(|effect| is_seen || changes_lengths(effect, problem));
     counted.filter_map(of_effect).collect()
+}
+
+/// Returns the effects of `problem` that depend on directions of approach which `poses` do not state,
+/// each with half of what the direction changes, at the full parameter vector `x` of `model`.
+///
+/// A pose with earlier poses states the way that friction depends on. Without a column of
+/// directions, the moment of the loads stands for the direction at the play of a joint.
+pub(super) fn unknown_sides(
+    (problem, model): (&Problem, &Model),
+    x: &[f64],
+    poses: &[Pose],
+) -> Vec<Uncorrected> {
+    let sided = || problem.effects.iter().map(|of| &of.effect).filter(|of| of.has_sides());
+    let names = |of: &Effect| of.parameters(problem).into_iter().map(|parameter| parameter.name);
+    let of_joint = |effect: &Effect, joint: usize| {
+        let reads = |pose: &Pose| match pose.setup.approach.and_then(|sides| sides.get(joint)) {
+            _ if effect.is_friction_alone() => pose.setup.past.read().times.is_empty(),
+            side => side.is_some() || !effect.is_play(),
+        };
+        let is_unknown = |pose: &Pose| {
+            let side = pose.setup.approach.and_then(|sides| sides.get(joint));
+            side.is_none_or(|side| side.total_cmp(&0.0).is_eq()) && reads(pose)
+        };
+        let mut chosen: Vec<usize> = (0..poses.len()).collect();
+        chosen.retain(|&row| poses.get(row).is_some_and(is_unknown));
+        let others: Vec<String> =
+            sided().filter(|other| !other.is_same_as(effect)).flat_map(names).collect();
+        let parameters = model.parameters.iter().zip(x);
+        let alone = parameters.map(|(parameter, x)| match others.contains(&parameter.name) {
+            true => 0.0,
+            false => *x,
+        });
+        let alone: Vec<f64> = alone.collect();
+        let at = |side: f64| {
+            let sides: Vec<f64> =
+                (0..model.joints()).map(|other| if other == joint { side } else { 0.0 }).collect();
+            let of_rows = chosen.iter().filter_map(|&row| poses.get(row)).map(|pose| Pose {
+                setup: PoseView { approach: Some(&sides), ..pose.setup },
+                ..*pose
+            });
+            model.predicted_targets(&of_rows.collect::<Vec<Pose>>(), &alone)
+        };
+        let mut differences = vec![Vector3::zeros(); poses.len()];
+        for (&row, (more, less)) in chosen.iter().zip(at(1.0).into_iter().zip(at(-1.0))) {
+            let half = (more - less) * 0.5;
+            if let Some(difference) = differences.get_mut(row)
+                && half.iter().all(|x| x.is_finite())
+            {
+                *difference = half;
+            }
+        }
+        let acts = differences.iter().any(|half| half.norm() > MAX_ROUNDING);
+        let effect = effect.clone();
+        acts.then_some(Uncorrected { effect, differences, side: Some(joint), is_bounded: true })
+    };
+    let each = |effect| (0..model.joints()).map(move |joint| (effect, joint));
+    sided().flat_map(each).filter_map(|(effect, joint)| of_joint(effect, joint)).collect()
+}
+
+/// Adds the effects of unknown directions of approach to the uncertainty of each pose.
+pub(super) fn widen(poses: &mut [CorrectedPose], sides: &[Uncorrected]) {
+    for of in sides {
+        for (pose, half) in poses.iter_mut().zip(&of.differences) {
+            pose.aside += half.norm();
+        }
+    }
 }
 
 /// Returns the root mean square difference \[m\] between readings and true positions if the
@@ -89,6 +160,7 @@ pub fn true_positions(
     rows: &Measurements,
     prediction: &Prediction,
 ) -> Result<Option<f64>, PredictError> {
+    let rows = &*rows.with_sides(estimate.has_approach);
     let placement = Placement::of(rows);
     let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let every_row: Vec<usize> = (0..rows.len()).collect();

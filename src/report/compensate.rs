@@ -10,7 +10,7 @@ use crate::fit::Command;
 use crate::measurement::Measurements;
 use crate::problem::{Effect, Joint, JointKind, Problem};
 use crate::quantity::format::{mm, number};
-use crate::remainder::{Bounds, Compensation, Rival, TargetFrame};
+use crate::remainder::{Bounds, Compensation, Rival, TargetFrame, Uncorrected};
 use crate::results::CompensationResult;
 
 /// Returns the summary of the commands as text, with file and line of each target that cannot be
@@ -90,10 +90,45 @@ pub fn undecided_commands(found: &Compensation, rivals: &[Rival]) -> Option<(Str
 
 /// Returns a warning that names the effects of the instrument by which the commands are not
 /// corrected, and what to declare if they are motions of the arm; `None` if there are none.
-/// `is_undecided` is true if another warning names those that the bound does not include.
-pub fn uncorrected_commands(found: &Compensation, is_undecided: bool) -> Option<String> {
-    let named: Vec<_> =
-        found.uncorrected.iter().filter(|of| of.is_bounded || !is_undecided).collect();
+/// `is_undecided` is true if another warning names those that the bound does not include. Another
+/// warning is of directions of approach that the targets do not state.
+pub fn uncorrected_commands(found: &Compensation, is_undecided: bool) -> Vec<String> {
+    let sides = unknown_sides(&found.uncorrected, found.bounds.is_some());
+    of_instrument(found, is_undecided).into_iter().chain(sides).collect()
+}
+
+/// Returns a warning that names the directions of approach that rows do not state although effects
+/// depend on them, and the size of these effects; `None` if there are none.
+pub fn unknown_sides(uncorrected: &[Uncorrected], has_bounds: bool) -> Option<String> {
+    let (mut columns, mut effects) = (Vec::new(), Vec::new());
+    for of in uncorrected {
+        let Some(joint) = of.side else { continue };
+        let (rms, most) = of.sizes();
+        let column = format!("approach{}", joint + 1);
+        if !columns.contains(&column) {
+            columns.push(column);
+        }
+        let name = of.effect.name_and_place();
+        effects.push(format!("{name} (± {} mm rms, {} mm at most)", mm(rms, 3), mm(most, 3)));
+    }
+    if effects.is_empty() {
+        return None;
+    }
+    let [column, depends] =
+        if columns.len() == 1 { ["column", "depends"] } else { ["columns", "depend"] };
+    let covered = if has_bounds { "; the bound covers both" } else { "" };
+    Some(format!(
+        "rows do not state from which side joints come: {} {depends} on that, and the middle is \
+         taken; add the {column} {}, 1 or -1, the direction of the last motion{covered}",
+        effects.join(", "),
+        columns.join(", ")
+    ))
+}
+
+/// Returns the warning about effects of the instrument; `None` if there are none.
+fn of_instrument(found: &Compensation, is_undecided: bool) -> Option<String> {
+    let of_instrument = found.uncorrected.iter().filter(|of| of.side.is_none());
+    let named: Vec<_> = of_instrument.filter(|of| of.is_bounded || !is_undecided).collect();
     let (mut effects, mut remedies) = (Vec::new(), Vec::new());
     for of in &named {
         let (rms, most) = of.sizes();

@@ -77,7 +77,7 @@ pub use self::{
     compare::{compare_text, comparison_report},
     compensate::Doubts,
     compensate::commands_text,
-    compensate::{certified_length, uncorrected_commands, undecided_commands},
+    compensate::{certified_length, uncorrected_commands, undecided_commands, unknown_sides},
     export::{
         ExportRemarks, better_geometry, export_text, holds_whole_model, kept_at_end,
         set_up_comment, worse_than_nominal,

@@ -57,6 +57,9 @@ pub struct IdentificationResult {
     /// effects is zero.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub session_times_s: BTreeMap<String, f64>,
+    /// True if the rows have directions of approach.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub has_approach: bool,
     /// Standard deviation (1 σ) of a coordinate, estimated from the residuals of this or of the
     /// earlier fit. Null if the problem declares σ, or without degrees of freedom.
     pub estimated_sigma_mm: Option<f64>,
@@ -319,6 +322,7 @@ impl IdentificationResult {
             reduced_chi2: found.reduced_chi2,
             first_time_s: found.start_times.first,
             session_times_s: found.start_times.sessions.clone(),
+            has_approach: found.has_approach,
             estimated_sigma_mm: match found.noise {
                 Noise::Declared => found.prior.as_ref().and_then(|prior| prior.estimated_sigma),
                 Noise::Unknown => None,

@@ -100,6 +100,77 @@ fn errors_of_the_instrument_are_named_and_bounded_in_commands() {
     }
 }
 
+/// The arm with an effect at joint 3, and the truth with the same.
+fn with_effect(effect: &str, truth: &str) -> [String; 2] {
+    let kind = effect.split(' ').next().unwrap_or_default();
+    let arm = THREE_JOINTS[0].replace("[data]", &format!("'{kind}*' = {{ free = true }}\n[data]"));
+    [format!("{arm}[[effect]]\n{effect}\n"), format!("{}{truth}\n", THREE_JOINTS[1])]
+}
+
+#[test]
+fn targets_without_directions_of_approach_have_wider_bounds() {
+    let play = "backlash = { joint = 3 }";
+    let friction = "joint-hysteresis = { joint = 3, distance_rad = 0.2 }";
+    let law = "law = { name = 'l', at = 'joint3', terms = ['approach3'], sigma_deg = 0.1 }";
+    // Each effect with the table of the truth, and whether rows to fit have the columns.
+    let cases = [
+        (play, "[[effect]]\nbacklash = { joint = 3 }\nwidth_deg = 0.1", true),
+        (law, "[[effect]]\nbacklash = { joint = 3 }\nwidth_deg = 0.1", true),
+        (
+            friction,
+            "[[effect]]\njoint-hysteresis = { joint = 3, distance_rad = 0.2 }\namplitude_deg = 0.05",
+            false,
+        ),
+    ];
+    for (effect, truth, has_sides) in cases {
+        let [arm, truth] = with_effect(effect, truth);
+        let truth =
+            if has_sides { truth } else { truth.replace("[poses]", "[poses]\napproach = false") };
+        let folder = Folder::with([("problem.toml", arm.as_str()), ("truth.toml", truth.as_str())]);
+        folder.simulate(".", "truth.toml", 60, 1, "rows.csv");
+        let without = |name: &str, columns: &[&str]| {
+            let table = folder.table("rows.csv");
+            let kept: Vec<usize> = (0..table.columns.len())
+                .filter(|&k| !columns.contains(&&*table.columns[k]))
+                .collect();
+            let line = |row: &[String]| {
+                kept.iter().map(|&k| row[k].clone()).collect::<Vec<_>>().join(",") + "\n"
+            };
+            let rows: String = table.rows.iter().map(|row| line(row)).collect();
+            folder.write(name, line(&table.columns) + &rows);
+        };
+        let sides = ["approach1", "approach2", "approach3"];
+        without("targets.csv", &[sides.as_slice(), &["time_s"]].concat());
+        folder.flexcal("identify . --out out").success();
+        let run = "compensate . --estimate out/estimate.json --data targets.csv --out out --json";
+        let commands = folder.flexcal(run);
+        let said = ["approach3", "1 or -1", "the bound covers both"];
+        assert_contains(&commands.stderr, &said);
+        let result = commands.json();
+        let half = result["uncorrected"][0]["rms_mm"].as_f64().unwrap();
+        assert!((0.3..1.1).contains(&half), "{effect}: {half} mm");
+        // What the half widths are is covered, and nothing is said where the column states it.
+        let bounds = folder.table("out/commands.csv").numbers("bound95_mm");
+        let table = folder.table("targets.csv");
+        let header = table.columns.join(",") + ",approach1,approach2,approach3\n";
+        let rows = table.rows.iter().map(|row| row.join(",") + ",1,1,-1\n");
+        folder.write("sides.csv", header + &rows.collect::<String>());
+        let run = "compensate . --estimate out/estimate.json --data sides.csv --out known --json";
+        let known = folder.flexcal(run);
+        assert!(!known.stderr.contains("the middle"), "{effect}: {known:?}");
+        let narrow = folder.table("known/commands.csv").numbers("bound95_mm");
+        let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+        assert!(mean(&bounds) > mean(&narrow) + 0.9 * half, "{effect}: {bounds:?}");
+        let predict = "predict . --estimate out/estimate.json --data targets.csv --out p";
+        let predicted = folder.flexcal(predict).success();
+        if has_sides {
+            assert_contains(&predicted.stderr, &said);
+            let bounds = folder.table("p/predictions.csv").numbers("bound95_mm");
+            assert!(mean(&bounds) > mean(&narrow) + 0.9 * half, "{effect}: {bounds:?}");
+        }
+    }
+}
+
 #[test]
 fn held_out_rows_widen_bounds_that_they_contradict() {
     let held_out = "held_out = { fraction = 0.4, seed = 2 }";

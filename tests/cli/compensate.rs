@@ -202,27 +202,6 @@ fn targets_without_what_an_effect_follows_are_reached_without_it() {
 }
 
 #[test]
-fn targets_without_the_approach_that_a_play_was_fitted_by_are_named() {
-    let folder = Folder::new();
-    for name in ["problem.toml", "measurements.csv"] {
-        folder.copy(&format!("problems/service-arm/{name}"), name);
-    }
-    let play = "\n[[effect]]\nbacklash = { joint = 2 }\n";
-    folder.write("problem.toml", folder.read("problem.toml") + play);
-    folder.flexcal("identify . --out out");
-    let table = folder.read("measurements.csv");
-    let said = |columns: usize| {
-        let row = |line: &str| line.split(',').take(columns).collect::<Vec<_>>().join(",") + "\n";
-        folder.write("targets.csv", table.lines().take(4).map(row).collect::<String>());
-        let command = "compensate . --estimate out/estimate.json --data targets.csv --out c";
-        folder.flexcal(command).stderr
-    };
-    let words = "the table has no columns approach1 …, and backlash was fitted by them";
-    assert!(said(11).contains(words), "{}", said(11));
-    assert!(!said(15).contains("approach1"), "{}", said(15));
-}
-
-#[test]
 fn an_estimate_of_another_arm_is_refused() {
     let folder = Folder::with_lunar_sampler();
     folder.flexcal("identify . --quiet --out .").success();

@@ -199,12 +199,20 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
     let narrow = joined("by = 'time', tolerance_s = 0.001", &near, &logged).unwrap_err();
     assert_says(&narrow, &["tolerance_s is too small", "write tolerance_s = 0.60 in joints"]);
     let twice = error(tracker, &log.replace("P2", "P1"));
-    assert_says(&twice, &["controller.csv:3: column Point: the pose P1 is already on line 2"]);
-    let (first, second) = (log.lines().nth(1).unwrap(), log.lines().nth(2).unwrap());
-    let home = |row: &str| row.replace("P1", "HOME").replace("P2", "HOME") + "\n";
-    assert!(
-        joined("by = 'name'", tracker, &(log.to_owned() + &home(first) + &home(second))).is_ok()
+    assert_says(
+        &twice,
+        &["controller.csv:3: column Point: the pose P1 is already on line 2", "by = \"time\""],
     );
+    let untimed = log.replace("time_s", "note2").replace("P2", "P1");
+    assert!(!error(tracker, &untimed).to_string().contains("by = "));
+    // Names that no measured row asks for may repeat.
+    let stops = format!("{log}40,HOME,0,0,d\n50,HOME,0,0,e\n");
+    let (rows, warnings) = joined("by = 'name'", tracker, &stops).unwrap();
+    let unused = warnings.iter().filter_map(|warning| match &warning.kind {
+        WarningKind::WithoutPartner { rows, .. } => Some(*rows),
+        _ => None,
+    });
+    assert_eq!((rows.len(), unused.collect::<Vec<_>>()), (2, vec![1, 3]));
 }
 
 #[test]

@@ -57,24 +57,7 @@ pub(crate) fn missing_loads(
              taken in every row: add the column if {other}"
         ))
     };
-    let lacking = lacking.filter_map(sentence).chain(missing_time(problem, estimate, rows));
-    lacking.chain(missing_approach(problem, rows)).collect()
-}
-
-/// Returns a sentence if `rows` lack directions of approach, an effect depends on them, and the
-/// tables of the problem have them or cannot be read.
-fn missing_approach(problem: &Problem, rows: &Measurements) -> Option<String> {
-    let lacks = rows.approach.is_none();
-    let effect = problem.effects.iter().find(|of| of.effect.has_sides()).filter(|_| lacks)?;
-    let fitted = Measurements::read(&problem.data.files, problem);
-    fitted.map_or(true, |(fitted, _)| fitted.approach.is_some()).then(|| {
-        format!(
-            "the table has no columns approach1 …, and {} was fitted by them: the sign of the \
-             moment, or no direction, is taken, and neither commands nor bounds can be relied \
-             upon; add the columns: -1 or 1, the direction from which each joint comes",
-            effect.effect.name()
-        )
-    })
+    lacking.filter_map(sentence).chain(missing_time(problem, estimate, rows)).collect()
 }
 
 /// Returns a sentence if `rows` lack times, the rows of `estimate` had times, and an effect depends on

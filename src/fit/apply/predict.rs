@@ -102,7 +102,7 @@ impl Identification {
         model: &Model,
         rows: &Measurements,
     ) -> Result<Vec<Vector3<f64>>, IdentifyError> {
-        let errors = self.errors(model, rows)?;
+        let errors = self.errors(model, &rows.with_sides(self.has_approach))?;
         Ok(rows.positions.iter().zip(errors).map(|(measured, error)| measured - error).collect())
     }
 

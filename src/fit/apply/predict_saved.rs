@@ -169,6 +169,7 @@ pub fn predict(
     rows: &Measurements,
     split: Option<&Split>,
 ) -> Result<Prediction, PredictError> {
+    let rows = &*rows.with_sides(estimate.is_some_and(|estimate| estimate.has_approach));
     check_columns(problem, rows)?;
     let placement = Placement::of(rows);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;

@@ -39,6 +39,7 @@ impl Identification {
         problem: &Problem,
         rows: &Measurements,
     ) -> Result<Vec<PredictedPosition>, IdentifyError> {
+        let rows = &*rows.with_sides(self.has_approach);
         let model = self.model(problem, &Placement::of(rows))?;
         let positions = self.predict_with(&model, rows)?;
         let x = self.vector(&model)?;
@@ -95,6 +96,7 @@ pub fn standard_errors(
     rows: &Measurements,
     x: &DVector<f64>,
 ) -> Result<Vec<Vector3<f64>>, PredictError> {
+    let rows = &*rows.with_sides(estimate.has_approach);
     let placement = Placement::of(rows);
     let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let all: Vec<usize> = (0..rows.len()).collect();

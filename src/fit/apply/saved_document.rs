@@ -38,6 +38,7 @@ pub(super) struct Document {
     pub estimated_sigma_mm: Option<f64>,
     pub first_time_s: Option<f64>,
     pub session_times_s: Option<BTreeMap<String, f64>>,
+    pub has_approach: Option<bool>,
     pub parameters: Vec<Entry>,
     pub remainder: Option<RemainderEntry>,
     pub measurement_files: Option<Vec<PathBuf>>,

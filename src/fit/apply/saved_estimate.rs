@@ -56,6 +56,8 @@ pub struct SavedEstimate {
     /// Start time of each session, relative to which time-dependent terms are evaluated; `None` in
     /// files of older versions.
     pub start_times: Option<StartTimes>,
+    /// True if the fitted rows had directions of approach; false in files of older versions.
+    pub(crate) has_approach: bool,
     /// Name of the `remainder.json` in the same folder; `None` if no remainder was accepted.
     pub remainder: Option<String>,
     /// Text of the remainder, if it is in no file.
@@ -162,6 +164,7 @@ impl SavedEstimate {
             estimated_sigma_mm,
             first_time_s,
             session_times_s,
+            has_approach,
             mut parameters,
             remainder,
             measurement_files,
@@ -238,6 +241,7 @@ impl SavedEstimate {
             estimated_sigma,
             start_times: first_time_s
                 .map(|first| StartTimes { first, sessions: session_times_s.unwrap_or_default() }),
+            has_approach: has_approach.unwrap_or(false),
             remainder: remainder.and_then(|result| result.file),
             remainder_text: None,
             measurement_files: measurement_files.unwrap_or_default(),
