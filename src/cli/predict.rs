@@ -78,10 +78,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let is_random_split = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
     let split =
         Split::new(&problem, &rows).ok().filter(|_| !is_random_split || common.data().is_empty());
-    let correction = match &estimate {
-        Some(estimate) => remainder::of_estimate(&problem, estimate)?,
-        None => None,
-    };
+    let of_estimate = |of| remainder::of_estimate(&problem, of);
+    let correction = estimate.as_ref().map(of_estimate).transpose()?.flatten();
     let (prediction, bounds) = match (&estimate, &correction) {
         (Some(estimate), Some(correction)) => {
             let CorrectedPrediction { prediction, poses, sides } =

@@ -108,10 +108,8 @@ pub(super) fn unknown_sides(
         let others: Vec<String> =
             sided().filter(|other| !other.is_same_as(effect)).flat_map(names).collect();
         let parameters = model.parameters.iter().zip(x);
-        let alone = parameters.map(|(parameter, x)| match others.contains(&parameter.name) {
-            true => 0.0,
-            false => *x,
-        });
+        let alone = parameters
+            .map(|(parameter, x)| if others.contains(&parameter.name) { 0.0 } else { *x });
         let alone: Vec<f64> = alone.collect();
         let at = |side: f64| {
             let sides: Vec<f64> =

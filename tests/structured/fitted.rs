@@ -61,7 +61,7 @@ impl Fitted {
         let split = split.as_ref();
         Ok(match &self.correction {
             Some(correction) => {
-                let CorrectedPrediction { prediction, poses } =
+                let CorrectedPrediction { prediction, poses, .. } =
                     remainder::predict(&self.problem, &self.saved, correction, rows, split)?;
                 (prediction, Some(poses))
             }
