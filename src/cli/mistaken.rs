@@ -148,7 +148,7 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
                 )
             })
         }
-        ErrorKind::MissingRequiredArgument if first.starts_with("--estimate") => Some(
+        ErrorKind::MissingRequiredArgument if first == "compensate" => Some(
             "flexcal identify writes estimate.json, and flexcal loop one in its folder closed: \
              --estimate out/<name of the problem>/estimate.json"
                 .to_owned(),

@@ -42,10 +42,10 @@ fn headers() {
         ("name: arm\nq1: 1\n", &["rows.csv:1: a YAML file, not a table"]),
         ("# From arm.urdf\nname = \"arm\"\n", &["rows.csv:2: a TOML file, not a table"]),
         (
-            "q1_deg,x_in,y_in,z_in\n",
+            "q1_deg,x_cm,y_in,z_in\n",
             &[
-                "rows.csv:1: column x_in: a length is not given in in; write x_m or x_mm, and convert \
-                 the numbers: 1 in is 25.4 mm",
+                "rows.csv:1: column x_cm: a length is not given in cm; write x_m or x_mm, and convert \
+                 the numbers: 1 cm is 10 mm",
             ],
         ),
         ("q1_deg,x_cm,y_cm,z_cm\n", &["column x_cm: ", "1 cm is 10 mm"]),
