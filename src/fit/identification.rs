@@ -286,7 +286,6 @@ fn fit_rows(
             refuted_priors: &refuted_priors,
             poses: &enough,
             not_converged: not_converged.as_ref(),
-            hidden: &statistics.hidden,
             prior_sizes: &prior_sizes,
             spreads: &spreads,
             // A fit that starts from another fit of the same table does not search misreadings

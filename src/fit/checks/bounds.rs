@@ -52,5 +52,5 @@ pub(super) fn bounds_are_seen(fit: &CheckedFit) -> Vec<Finding> {
         let numbers = [json!(name), side.into(), (*deviation).into(), json!(names)];
         Finding::new(FindingCode::BoundInUnidentifiedDirection, numbers, text)
     };
-    fit.hidden.iter().map(finding).collect()
+    fit.statistics.hidden.iter().map(finding).collect()
 }

@@ -15,7 +15,6 @@ use crate::fit::errors::Errors;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::stages::stage::Stage;
 use crate::fit::stages::strategy::Strategy;
-use crate::fit::uncertainty::hidden_by_limit::HiddenByLimit;
 use crate::fit::uncertainty::noise::{Noise, together};
 use crate::fit::uncertainty::prior_sizes::PriorSize;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
@@ -78,8 +77,6 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub poses: &'a PoseSufficiency,
     /// Finding that the fit did not converge; `None` if it converged.
     pub not_converged: Option<&'a Finding>,
-    /// Bounds that hide the uncertainty of other unknowns.
-    pub hidden: &'a [HiddenByLimit],
     /// Prior widths that the fitted deviations contradict.
     pub prior_sizes: &'a [PriorSize],
     /// Scatter of the predicted target at each touched point: with the registered nominal arm and

@@ -100,8 +100,8 @@ fn headers() {
 #[test]
 fn a_name_that_joints_share_is_no_column() {
     let arm = "name = 'arm'\n[[joint]]\nname = 'wrist'\n[[joint]]\nname = 'wrist'\n[[joint]]\nname = 'hand'\n";
-    let both = "several joints are called \"wrist\" (problem.toml:2, problem.toml:4); give each its \
-                own name, or write q1_deg or q1_rad and q2_deg or q2_rad";
+    let both = "several joints are called \"wrist\" (problem.toml:2, problem.toml:4); give each a \
+                different name, or write q1_deg or q1_rad and q2_deg or q2_rad";
     for (header, words) in [
         ("wrist_deg,q2_deg,q3_deg,x_m,y_m,z_m\n", format!("rows.csv:1: column wrist_deg: {both}")),
         (
