@@ -9,8 +9,9 @@ use super::clocks::{
     shifts_by_rows,
 };
 use super::instants::is_clock;
-use super::join_key::{Key, find_key, name_column, time_key};
+use super::join_key::{Key, name_column, time_key};
 use super::joined_row::LogRow;
+use super::key_column::find_key;
 use super::mapped::Names;
 use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
 use super::spelling::{misplaced, quoted, same_but_for_spelling, usual_difference};

@@ -32,6 +32,7 @@ mod instants;
 mod join_key;
 mod joined;
 mod joined_row;
+mod key_column;
 #[deny(clippy::indexing_slicing)]
 mod labels;
 mod latin;

@@ -133,7 +133,7 @@ fn a_table_in_memory_is_read_as_the_file_is() {
     let told = [
         (replaced("q1_deg", numbers(5, f64::NAN)), "memory:7: column q1_deg: NaN is not a finite"),
         (replaced("x_mm", numbers(77, 1e200)), "memory:79: column x_mm: 1e200 is larger than"),
-        (replaced("x_mm", words(0, "a,\"b")), "memory:2: column x_mm: \"a,\"b\" is not a number"),
+        (replaced("x_mm", words(0, "a,\"b")), "memory:2: column x_mm: \"a,\"b\" is a text"),
         (replaced("split", words(1, "")), "memory:2: column split: \"1\" is neither"),
         (replaced("z_mm", words(3, "")), "memory:5: column z_mm: the cell is empty"),
         (
