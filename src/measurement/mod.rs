@@ -69,8 +69,7 @@ mod table;
 mod time;
 mod unmeasured;
 
-use std::collections::HashSet;
-use std::path::PathBuf;
+use std::{collections::HashSet, path::PathBuf};
 
 use nalgebra::{UnitQuaternion, Vector3};
 
