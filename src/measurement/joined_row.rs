@@ -1,4 +1,4 @@
-//! Rows of a joint table, and rows of a table with the cells of a row of the joint table behind their own.
+//! Rows of a joint table, and rows of a table with the cells of a joint row behind the others.
 
 use std::path::Path;
 
