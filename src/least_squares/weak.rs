@@ -30,6 +30,9 @@ pub struct Weak {
     /// Share of each unknown outside the weak combinations: 1 − squared length of its projection
     /// onto them, 0…1. It is 1 for unknowns without a plausible size.
     pub visible: Vec<f64>,
+    /// Change of each unknown where every weak combination moves by its plausible size, as a root
+    /// of the sum of squares \[unit of x\]. Unknowns without a plausible size follow the others.
+    pub moves: Vec<f64>,
 }
 
 impl Weak {
@@ -64,11 +67,8 @@ impl Weak {
         }
         let mut reduced = Triangle::new(n);
         reduced.absorb(&mut block);
-        let conditional = reduced
-            .into_linearisation()
-            .triangle
-            .view((first, first), (sized.len(), sized.len()))
-            .into_owned();
+        let reduced = reduced.into_linearisation().triangle;
+        let conditional = reduced.view((first, first), (sized.len(), sized.len())).into_owned();
         if conditional.iter().any(|value| !value.is_finite()) || has_no_weak_direction(&conditional)
         {
             return None;
@@ -82,10 +82,16 @@ impl Weak {
         let spanned =
             super::identifiability::orthogonal_complement(&right.columns(0, strong).into_owned());
         let mut rows = DMatrix::zeros(spanned.nrows(), n);
-        let mut visible = vec![1.0; n];
+        let (mut visible, mut moves) = (vec![1.0; n], vec![0.0; n]);
         for (column, &(j, size)) in sized.iter().enumerate() {
             visible[j] = (1.0 - spanned.column(column).norm_squared()).clamp(0.0, 1.0);
             rows.set_column(j, &(spanned.column(column) * (longest / size)));
+            moves[j] = size * spanned.column(column).norm();
+        }
+        let follow = reduced.view((0, first), (first, sized.len())) * spanned.transpose();
+        let follow = reduced.view((0, 0), (first, first)).solve_upper_triangular(&follow);
+        for (row, &j) in unsized_unknowns.iter().enumerate() {
+            moves[j] = follow.as_ref().map_or(0.0, |follow| follow.row(row).norm());
         }
         let combination = |row: nalgebra::RowDVector<f64>| {
             let sign = row
@@ -101,7 +107,7 @@ impl Weak {
             }
         };
         let combinations = spanned.row_iter().map(|row| combination(row.into_owned())).collect();
-        (strong < sized.len()).then_some(Self { rows, combinations, visible })
+        (strong < sized.len()).then_some(Self { rows, combinations, visible, moves })
     }
 }
 
@@ -216,5 +222,16 @@ mod tests {
         );
         assert!(weak.rows[(0, 2)].abs() < 1e-9 * weak.rows.amax());
         assert!((weak.visible[0] - 0.5).abs() < 1e-4 && (weak.visible[2] - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn unknowns_without_a_size_follow_weak_combinations() {
+        // y = x₀ + x₂ and x₁ + ε x₂; only x₁ and x₂ have a size, and x₀ follows x₂.
+        let triangle =
+            DMatrix::from_row_slice(3, 3, &[1e3, 0.0, 1e3, 0.0, 1e3, 1e1, 0.0, 0.0, 1e-3]);
+        let weak = Weak::of(&triangle, &[None, Some(1.0), Some(2.0)]).unwrap();
+        assert!((weak.moves[0] - 2.0).abs() < 1e-3, "{:?}", weak.moves);
+        assert!((weak.moves[1] - 0.02).abs() < 1e-4, "{:?}", weak.moves);
+        assert!((weak.moves[2] - 2.0).abs() < 1e-3, "{:?}", weak.moves);
     }
 }

@@ -227,6 +227,10 @@ finding_codes! {
         "Rows that a loop excluded from the choice of effects count in full in its last fit, whose \
          χ²/ν is larger than noise explains.",
         "correct these rows or leave them out, or limit their influence with a section [robust]";
+    FartherSolution: Warning "farther-solution" ["parameter", "estimate", "second", "excess", "probability", "apart", "configuration"]
+        "A second arm explains the measurements too, but deviates from the nominal arm 19 times as \
+         much and more: its probability is below 5 %.",
+        "measure poses in which the two differ, or give priors that decide between them";
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide \
          part of the result.",

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
-use crate::fit::uncertainty::second_solution::{SecondSolution, distance};
+use crate::fit::uncertainty::second_solution::SecondSolution;
 use crate::model::Pose;
 use crate::model::parameter::Parameter;
 use crate::problem::{JointKind, PoseView};
@@ -25,22 +25,26 @@ const MOST_DECIMALS: usize = 6;
 
 /// Checks that the measurements exclude every other arm that is found.
 pub(super) fn one_solution(fit: &CheckedFit) -> Option<Finding> {
-    fit.second.and_then(|second| two_solutions_finding(fit, second))
+    fit.second.map(|second| two_solutions_finding(fit, second))
 }
 
 /// Reports the parameter in which the arms differ most, in standard errors, and the configuration
 /// in which their predictions do.
-fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Option<Finding> {
+fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Finding {
     let x = &fit.end.x;
-    let most = distance(fit.whole, fit.statistics, x, &second.x)?.unknown;
-    let k = fit.whole.unknowns[most];
+    let k = fit.whole.unknowns[second.most];
     let parameter = &fit.model().parameters[k];
     let name = &parameter.name;
-    let error = parameter.value_error(x[k], fit.statistics.errors[most]);
+    let error = parameter.value_error(x[k], fit.statistics.errors[second.most]);
     let [estimate, other] = [x, &second.x].map(|x| parameter.value(x[k]));
     let probability = second.probability();
+    let (code, place) = if second.is_too_far() {
+        (FindingCode::FartherSolution, ", farther from the nominal one,")
+    } else {
+        (FindingCode::TwoSolutions, "")
+    };
     let text = format!(
-        "a second arm explains the measurements too, with a probability of {:.1} %: {name} is {} instead of {} (χ² \
+        "a second arm{place} explains the measurements too, with a probability of {:.1} %: {name} is {} instead of {} (χ² \
          with priors is {} larger)",
         probability * 100.0,
         shown(parameter, other, error),
@@ -58,8 +62,8 @@ fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Option<Fi
         json!(told.as_ref().map(|told| told.1)),
         json!(told.as_ref().map(|told| &told.0)),
     ];
-    let finding = Finding::new(FindingCode::TwoSolutions, numbers, text);
-    let Some((configuration, apart)) = told else { return Some(finding) };
+    let finding = Finding::new(code, numbers, text);
+    let Some((configuration, apart)) = told else { return finding };
     let remedy = if apart > MIN_APART * fit.sigma_taken {
         format!(
             "measure poses like q = {}, in which their targets are {} mm apart",
@@ -72,7 +76,7 @@ fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Option<Fi
              give it a narrower prior"
         )
     };
-    Some(finding.with_remedy(remedy))
+    finding.with_remedy(remedy)
 }
 
 /// Returns a value with its unit, to the digits of its standard error.

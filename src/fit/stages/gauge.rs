@@ -14,6 +14,9 @@ pub(in crate::fit) struct Gauge {
     pub rows: DMatrix<f64>,
     /// Part of each unknown outside the combinations, 0…1; 0 for unknowns at a bound.
     pub visible: Vec<f64>,
+    /// Change of each unknown where the weak combinations move by their plausible sizes, in SI
+    /// units.
+    pub moves: Vec<f64>,
     /// Combinations that data and priors determine too weakly; those that they leave undetermined
     /// are not in this list.
     pub weak: Vec<UnidentifiableCombination>,
@@ -52,8 +55,12 @@ impl Gauge {
         let weak = Weak::of(&factor_of_stacked(&factor, &undetermined), &sizes);
         let unidentifiable = undetermined.nrows();
         let count = unidentifiable + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
-        let mut gauge =
-            Gauge { rows: DMatrix::zeros(count, n), visible: vec![0.0; n], weak: Vec::new() };
+        let mut gauge = Gauge {
+            rows: DMatrix::zeros(count, n),
+            visible: vec![0.0; n],
+            moves: vec![0.0; n],
+            weak: Vec::new(),
+        };
         for (j, &k) in free.iter().enumerate() {
             gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&undetermined.column(j));
             gauge.visible[k] = outside[j];
@@ -63,6 +70,7 @@ impl Gauge {
                     .view_mut((unidentifiable, k), (count - unidentifiable, 1))
                     .copy_from(&weak.rows.column(j));
                 gauge.visible[k] = outside[j].min(weak.visible[j]);
+                gauge.moves[k] = weak.moves[j];
             }
         }
         let renumbered = |weak: UnidentifiableCombination| UnidentifiableCombination {

@@ -25,6 +25,12 @@ pub(in crate::fit) fn plausible_size(model: &Model, parameter: &Parameter) -> Op
     {
         return None;
     }
+    size_of_unit(model, parameter)
+}
+
+/// Returns the reach of the arm for a length, 1 rad for an angle, ln 100 for the logarithm of a
+/// stiffness, and `None` for other units.
+pub(in crate::fit) fn size_of_unit(model: &Model, parameter: &Parameter) -> Option<f64> {
     match parameter.unit() {
         Unit::Length => Some(model.reach()),
         Unit::Angle => Some(PLAUSIBLE_ANGLE),

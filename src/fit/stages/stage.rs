@@ -295,7 +295,8 @@ impl<'a> Stage<'a> {
     pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[ActiveLimit]) -> Gauge {
         let n = self.unknowns.len();
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
-            return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n], weak: Vec::new() };
+            let (rows, visible) = (DMatrix::zeros(0, n), vec![1.0; n]);
+            return Gauge { rows, visible, moves: vec![0.0; n], weak: Vec::new() };
         }
         Gauge::new(&self.data_triangle(at), &self.priors(), &self.sizes(), held, active)
     }

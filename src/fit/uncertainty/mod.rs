@@ -3,6 +3,7 @@
 
 pub(super) mod active_constraint;
 pub(super) mod covariance;
+mod curvature;
 pub(super) mod hidden_by_limit;
 mod left_out;
 pub(super) mod noise;
@@ -13,3 +14,4 @@ pub(super) mod residual_lengths;
 pub(super) mod second_solution;
 pub(super) mod shadow_price;
 pub(super) mod statistics;
+mod surroundings;

@@ -16,22 +16,19 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::stages::noise_model::NoiseModel;
-use crate::fit::stages::parameter_size::plausible_size;
+use crate::fit::stages::parameter_size::{largest_deviation, plausible_size};
 use crate::fit::stages::stage::{Stage, StageError};
+use crate::fit::uncertainty::curvature::refute_errors;
 use crate::fit::uncertainty::noise::{Noise, fitted};
 use crate::fit::uncertainty::statistics::Statistics;
+use crate::fit::uncertainty::surroundings::{Surroundings, rigid_predictions};
 use crate::fit::{SolverChoice, Strategy};
-use crate::least_squares::{jacobian_and_residual, residual_vector};
-use crate::model::PoseResiduals;
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
 /// Largest number of predicted rows of a rigid arm in the search for starts, which takes about a
 /// hundredth of a second. Problems with more rows or unknowns are not searched.
 const MAX_PREDICTIONS: usize = 100_000;
-/// Number of predictions of a rigid arm that take as long as one of an arm that gives way, with its
-/// equilibrium.
-const RIGID_PREDICTIONS_PER_ELASTIC: usize = 50;
 /// Largest increase of χ², foretold by the curvature, at which a fit is started. Far from the
 /// optimum the second derivatives are not constant, so that fits that end near it are foretold up
 /// to 2000; without a second solution it is 10 000 and more.
@@ -47,7 +44,7 @@ const MAX_SAME_DIRECTION: f64 = 0.9;
 const MAX_FITS: usize = 3;
 /// Maximum number of steps of such a fit. From the far side of a fold 4 to 10 are enough.
 const MAX_STEPS: u64 = 15;
-/// Maximum number of times that a better solution replaces the optimum.
+/// Maximum number of times that a more probable solution replaces the optimum.
 const MAX_REPLACEMENTS: usize = 3;
 /// Least difference of a parameter, in standard errors, that makes two solutions. Chance alone
 /// exceeds it three times in a thousand.
@@ -55,40 +52,59 @@ const MIN_DISTANCE: f64 = 3.0;
 /// Difference of an angle \[rad\] from which two solutions are two descriptions of one arm: whole
 /// turns, and half turns of neighbouring axes.
 const MAX_ANGLE: f64 = 3.0;
-/// Smallest probability of a second solution that is reported: that of a χ² larger by 13.8.
+/// Smallest probability of a second solution that is reported, with both equally probable before
+/// the measurements: that of a χ² larger by 13.8.
 const MIN_PROBABILITY: f64 = 1e-3;
+/// Logarithm of the odds (19 to 1) from which one of two solutions is decided.
+const LN_DECISIVE_ODDS: f64 = 2.944_438_979_166_44;
 
 /// Second optimum of a fit, which the measurements do not exclude.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct SecondSolution {
     /// Full parameter vector of the second solution: the deviation of each parameter from nominal.
     pub x: DVector<f64>,
+    /// Unknown in which it differs most from the fit, in standard errors.
+    pub most: usize,
     /// Excess of χ², with priors, over that of the fit; for an estimated σ that of −2 ln of the
     /// likelihood.
     pub excess: f64,
+    /// Logarithm of the ratio of its distance from the nominal arm to that of the fit.
+    ln_farther: f64,
 }
 
 impl SecondSolution {
-    /// Returns the probability that this solution is the true one of two that are equally probable
-    /// before the measurements.
+    /// Returns the probability that this solution is the true one of the two.
     pub fn probability(&self) -> f64 {
-        (1.0 + (0.5 * self.excess).exp()).recip()
+        (1.0 + (-self.ln_odds()).exp()).recip()
+    }
+
+    /// Returns true if this solution is improbable because it lies far from the nominal arm.
+    pub fn is_too_far(&self) -> bool {
+        self.ln_farther > LN_DECISIVE_ODDS && self.ln_odds() < -LN_DECISIVE_ODDS
+    }
+
+    /// Returns the logarithm of the odds that this solution is the true one rather than that of the
+    /// fit. Before the measurements they are those of a prior without a scale [Jeffreys 1946] for
+    /// the distance from the nominal arm: n times as far is 1/n times as probable.
+    fn ln_odds(&self) -> f64 {
+        -0.5 * self.excess - self.ln_farther
     }
 }
 
 /// Parameter that differs most between two solutions, as an index of an unknown, and the difference
 /// in standard errors of the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::fit) struct Distance {
-    pub unknown: usize,
-    pub standard_errors: f64,
+struct Distance {
+    unknown: usize,
+    standard_errors: f64,
 }
 
 /// Result of [`fitted`]: the end of a fit with its statistics and the source of its σ.
 type Fitted = (FitEnd, Statistics, Noise);
 
-/// Takes the best optimum that is found from `first`, and the second best if the measurements do
-/// not exclude it. `flags`: whether a σ is declared, and whether the poses suffice to contradict it.
+/// Takes the most probable optimum that is found from `first`, and the second one if the
+/// measurements do not exclude it. Standard errors that the curvature of the model refutes are
+/// marked. `flags`: whether a σ is declared, and whether the poses suffice to contradict it.
 pub(in crate::fit) fn best_of_two(
     fitting: &mut Fitting,
     first: Fitted,
@@ -100,29 +116,27 @@ pub(in crate::fit) fn best_of_two(
         if !is_searched(fitting, &best) {
             break;
         }
-        let whole = fitting.whole();
         let found = neighbours(fitting, &best)?;
-        let cost = whole.cost(&best.0.x);
-        let better = found.iter().filter(|x| whole.cost(x) < cost);
-        let next = better.min_by(|a, b| whole.cost(a).total_cmp(&whole.cost(b))).cloned();
+        let whole = fitting.whole();
+        let compared = |x: &DVector<f64>| compared(&whole, &best, fitting.noise_model, x.clone());
+        let better = found.iter().map(compared).filter(|solution| solution.ln_odds() > 0.0);
+        let next = better.max_by(|a, b| a.ln_odds().total_cmp(&b.ln_odds()));
         others.extend(found);
         let Some(next) = next else { break };
-        let replacement = fitted(fitting, &next, flags)?;
+        let replacement = fitted(fitting, &next.x, flags)?;
         others.push(std::mem::replace(&mut best, replacement).0.x);
     }
     let second = rival(&fitting.whole(), &best, fitting.noise_model, others);
+    refute_errors(fitting, &best.0, &mut best.1);
     Ok((best, second))
 }
 
 /// Returns true if the fit has an optimum and standard errors, and few enough rows and unknowns.
 fn is_searched(fitting: &Fitting, (end, _, noise): &Fitted) -> bool {
-    let whole = fitting.whole();
-    let gives_way = fitting.model.arm(|k| end.x[k]).is_elastic();
-    let weight = if gives_way { RIGID_PREDICTIONS_PER_ELASTIC } else { 1 };
     fitting.strategy != Strategy::OneSweep
         && end.termination.converged()
         && *noise != Noise::Unknown
-        && 4 * weight * whole.unknowns.len() * whole.poses.len() <= MAX_PREDICTIONS
+        && 4 * fitting.whole().unknowns.len() * rigid_predictions(fitting, end) <= MAX_PREDICTIONS
 }
 
 /// Returns the other optima to which the curvature at an optimum leads.
@@ -142,31 +156,58 @@ fn neighbours(fitting: &Fitting, best: &Fitted) -> Result<Vec<DVector<f64>>, Sta
     Ok(found)
 }
 
-/// Returns the best of `others` that is another solution than `best` and not excluded.
+/// Returns the most probable of `others` that is another solution than `best` and that the
+/// measurements do not exclude.
 fn rival(
     whole: &Stage,
-    (end, statistics, noise): &Fitted,
+    best: &Fitted,
     noise_model: NoiseModel,
     others: Vec<DVector<f64>>,
 ) -> Option<SecondSolution> {
-    let cost = whole.cost(&end.x);
-    let is_estimated = *noise != Noise::Declared || noise_model != NoiseModel::DECLARED;
-    let freedom = whole.count().saturating_sub(whole.unknowns.len()).max(1) as f64;
-    let excess = |x: &DVector<f64>| {
-        let excess = 2.0 * (whole.cost(x) - cost);
-        if is_estimated { freedom * (excess / freedom).ln_1p() } else { excess }
-    };
+    let least = -(MIN_PROBABILITY.recip() - 1.0).ln();
     let solutions = others
         .into_iter()
-        .filter(|x| distance(whole, statistics, &end.x, x).is_some())
-        .map(|x| SecondSolution { excess: excess(&x), x })
-        .filter(|solution| solution.probability() > MIN_PROBABILITY);
-    solutions.min_by(|a, b| a.excess.total_cmp(&b.excess))
+        .filter_map(|x| {
+            let most = distance(whole, &best.1, &best.0.x, &x)?.unknown;
+            Some(SecondSolution { most, ..compared(whole, best, noise_model, x) })
+        })
+        .filter(|solution| -0.5 * solution.excess > least);
+    solutions.max_by(|a, b| a.ln_odds().total_cmp(&b.ln_odds()))
+}
+
+/// Compares the solution `x` with `best`. The distance from the nominal arm is the largest
+/// deviation of a parameter without a prior.
+fn compared(
+    whole: &Stage,
+    (end, statistics, noise): &Fitted,
+    noise_model: NoiseModel,
+    x: DVector<f64>,
+) -> SecondSolution {
+    let is_estimated = *noise != Noise::Declared || noise_model != NoiseModel::DECLARED;
+    let freedom = whole.count().saturating_sub(whole.unknowns.len()).max(1) as f64;
+    let excess = 2.0 * (whole.cost(&x) - whole.cost(&end.x));
+    let excess = if is_estimated { freedom * (excess / freedom).ln_1p() } else { excess };
+    let [near, other] = [&end.x, &x].map(|x| largest_departure(whole, statistics, x));
+    let ln_farther = if near > 0.0 { (other / near).ln() } else { 0.0 };
+    SecondSolution { x, most: 0, excess, ln_farther }
+}
+
+/// Returns the largest deviation from nominal, as a share of the largest possible one, of the
+/// determined parameters without a prior. A deviation counts as at least its standard error.
+/// Returns 0 if there is no such parameter.
+fn largest_departure(stage: &Stage, statistics: &Statistics, x: &DVector<f64>) -> f64 {
+    let departure = |(unknown, (&k, parameter)): (usize, (&usize, &Parameter))| {
+        let is_judged = parameter.sigma.is_none() && statistics.determined[unknown];
+        let largest = largest_deviation(stage.model, parameter).filter(|_| is_judged)?;
+        Some(x[k].abs().max(statistics.errors[unknown]) / largest)
+    };
+    let unknowns = stage.unknowns.iter().zip(stage.parameters()).enumerate();
+    unknowns.filter_map(departure).fold(0.0, f64::max)
 }
 
 /// Returns the parameter that differs most between the optimum `x` and `other`; `None` unless it
 /// differs by [`MIN_DISTANCE`] standard errors, or if both describe the same arm.
-pub(in crate::fit) fn distance(
+fn distance(
     stage: &Stage,
     statistics: &Statistics,
     x: &DVector<f64>,
@@ -197,12 +238,12 @@ fn starts(stage: &Stage, at: &DVector<f64>, covariance: &DMatrix<f64>) -> Vec<DV
     let mut found: Vec<Mirror> = Vec::new();
     for (j, column) in covariance.column_iter().enumerate() {
         let error = covariance[(j, j)].max(0.0).sqrt();
-        let Some(along) = surroundings.mirror(&(column / error)).filter(|_| error > 0.0) else {
+        let Some(along) = mirror(&surroundings, &(column / error)).filter(|_| error > 0.0) else {
             continue;
         };
         // What adjusts the unknowns to b points along the fold, even where other directions
         // contribute to v.
-        found.extend(surroundings.mirror(&along.adjusted));
+        found.extend(mirror(&surroundings, &along.adjusted));
         found.push(along);
     }
     found.retain(|mirror| mirror.is_plausible && mirror.foretold < MAX_FORETOLD_EXCESS);
@@ -214,18 +255,6 @@ fn starts(stage: &Stage, at: &DVector<f64>, covariance: &DMatrix<f64>) -> Vec<DV
         }
     }
     chosen.into_iter().map(|mirror| stage.full_vector(at, &mirror.start)).collect()
-}
-
-/// Residuals and their derivatives at an optimum.
-struct Surroundings<'a> {
-    stage: &'a Stage<'a>,
-    covariance: &'a DMatrix<f64>,
-    residuals: PoseResiduals<'a>,
-    x: DVector<f64>,
-    r: DVector<f64>,
-    derivatives: DMatrix<f64>,
-    /// Rows of the priors and of earlier data, which are linear in the unknowns.
-    linear: DMatrix<f64>,
 }
 
 /// Place beyond a fold, along one direction from an optimum.
@@ -242,46 +271,27 @@ struct Mirror {
     adjusted: DVector<f64>,
 }
 
-impl<'a> Surroundings<'a> {
-    fn new(stage: &'a Stage<'a>, at: &DVector<f64>, covariance: &'a DMatrix<f64>) -> Self {
-        let residuals = stage.residuals(at);
-        let x = residuals.unknowns_in(at);
-        let (derivatives, r) = jacobian_and_residual(&residuals, &x);
-        let (priors, earlier) = (stage.priors(), stage.earlier_rows(at).matrix);
-        let mut linear = priors.clone().resize_vertically(priors.nrows() + earlier.nrows(), 0.0);
-        linear.view_mut((priors.nrows(), 0), earlier.shape()).copy_from(&earlier);
-        Self { stage, covariance, residuals, x, r, derivatives, linear }
-    }
-
-    /// Returns the change of all rows along a direction: of the data, then of the linear rows.
-    fn change(&self, v: &DVector<f64>) -> DVector<f64> {
-        let (data, linear) = (&self.derivatives * v, &self.linear * v);
-        DVector::from_iterator(data.len() + linear.len(), data.iter().chain(&linear).copied())
-    }
-
-    /// Returns the place beyond the fold along the direction v; `None` if the rows do not change
-    /// along it, or if it leaves the domain of the model.
-    fn mirror(&self, v: &DVector<f64>) -> Option<Mirror> {
-        let Self { stage, covariance, residuals, x, r, derivatives, .. } = self;
-        let slope = self.change(v);
-        let length = slope.norm();
-        let (v, slope) = (v / length, slope / length);
-        let [after, before] = [x + &v, x - &v].map(|x| residual_vector(residuals, &x));
-        let bend = after + before - r * 2.0;
-        let along = slope.rows(0, bend.len()).dot(&bend);
-        let t = -2.0 / along;
-        let adjusted = *covariance * derivatives.tr_mul(&bend);
-        let taken_up = self.change(&adjusted);
-        let mut left = -&taken_up;
-        left.rows_mut(0, bend.len()).add_assign(&bend);
-        let foretold = 0.25 * t.powi(4) * left.norm_squared() + t * t * r.dot(&bend);
-        let start = x + &v * t - (&adjusted - &v * along) * (0.5 * t * t);
-        let adjusted = adjusted / taken_up.norm();
-        let is_finite = foretold.is_finite()
-            && start.iter().chain(&adjusted).chain(&slope).all(|value| value.is_finite());
-        let is_plausible = is_plausible(stage, x, &(v * t));
-        is_finite.then_some(Mirror { start, is_plausible, foretold, slope, adjusted })
-    }
+/// Returns the place beyond the fold along the direction v; `None` if the rows do not change
+/// along it, or if it leaves the domain of the model.
+fn mirror(surroundings: &Surroundings, v: &DVector<f64>) -> Option<Mirror> {
+    let Surroundings { stage, x, r, .. } = surroundings;
+    let slope = surroundings.change(v);
+    let length = slope.norm();
+    let (v, slope) = (v / length, slope / length);
+    let bend = surroundings.bend(&v);
+    let along = slope.rows(0, bend.len()).dot(&bend);
+    let t = -2.0 / along;
+    let adjusted = surroundings.adjusted(&bend);
+    let taken_up = surroundings.change(&adjusted);
+    let mut left = -&taken_up;
+    left.rows_mut(0, bend.len()).add_assign(&bend);
+    let foretold = 0.25 * t.powi(4) * left.norm_squared() + t * t * r.dot(&bend);
+    let start = x + &v * t - (&adjusted - &v * along) * (0.5 * t * t);
+    let adjusted = adjusted / taken_up.norm();
+    let is_finite = foretold.is_finite()
+        && start.iter().chain(&adjusted).chain(&slope).all(|value| value.is_finite());
+    let is_plausible = is_plausible(stage, x, &(v * t));
+    is_finite.then_some(Mirror { start, is_plausible, foretold, slope, adjusted })
 }
 
 /// Returns true if the unknowns `x`, moved by `step`, may be those of a built arm.

@@ -17,6 +17,12 @@ use crate::model::Pose;
 /// standard error.
 const MAX_UNIDENTIFIABLE_SHARE: f64 = 1e-3;
 
+/// Deviation of an arm along a weak combination, as a share of the plausible size.
+const REAL_DEVIATION: f64 = 0.01;
+/// Largest change of an unknown, in its standard errors, by such deviations along all weak
+/// combinations at which the unknown still has a standard error.
+const MAX_MOVED: f64 = 0.3;
+
 /// Statistics of the unknowns of a fit.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Statistics {
@@ -153,14 +159,16 @@ impl Statistics {
             .collect();
         // A combination that the data determined at the start may be undetermined at the end, for
         // example if a rigidity went towards infinity.
-        let visible_at_end = stage.gauge(&end.x, &held, &constraints).visible;
-        let determined = (0..errors.len())
-            .map(|j| {
-                !held[j]
-                    && !is_open(j)
-                    && visible_at_end[j].min(end.gauge.visible[j]) > 1.0 - MAX_UNIDENTIFIABLE_SHARE
+        let gauge = stage.gauge(&end.x, &held, &constraints);
+        let gauges = [&gauge, &end.gauge];
+        let is_visible = |j: usize| {
+            gauges.iter().all(|gauge| {
+                gauge.visible[j] > 1.0 - MAX_UNIDENTIFIABLE_SHARE
+                    && REAL_DEVIATION * gauge.moves[j] <= MAX_MOVED * errors[j]
             })
-            .collect();
+        };
+        let determined =
+            (0..errors.len()).map(|j| !held[j] && !is_open(j) && is_visible(j)).collect();
         Ok(Self {
             covariance: uncertainty.covariance,
             errors,
