@@ -19,7 +19,7 @@ use crate::fit::checks::payload_place::payload_finding;
 use crate::fit::checks::pose_sufficiency::PoseSufficiency;
 use crate::fit::checks::required_columns::check_columns;
 use crate::fit::checks::{findings, held_out};
-use crate::fit::influential_rows::influential_rows;
+use crate::fit::influential_rows::influential;
 use crate::fit::outcome::{Estimate, Identification, enter};
 use crate::fit::stages::custom_solver::CustomSolver;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
@@ -115,9 +115,9 @@ pub fn identify_model(
             let split = Split { identification: kept, held_out: split.held_out.clone() };
             fit_rows(model, problem, (measurements, &split), &provisional).ok()
         };
-        if let Some(influential) = influential_rows(&found, without) {
-            found.state_influential_rows(&influential, measurements.leading());
-            found.influential_rows = Some(influential);
+        let rows = (measurements, split.identification.as_slice());
+        if let Some(influential) = influential(&found, rows, without) {
+            found.state_influential_rows(influential, measurements.leading());
         }
     }
     if !options.provisional && options.earlier.is_none() {

@@ -1,8 +1,12 @@
 //! Search for influential rows: few rows whose removal removes most of the misfit.
 
+use std::collections::BTreeMap;
+
 use crate::fit::checks::outliers::{InfluentialRows, Outlier};
+use crate::fit::checks::view_order::views;
 use crate::fit::outcome::Identification;
 use crate::fit::uncertainty::noise::Noise;
+use crate::measurement::Measurements;
 
 /// Ratio of the residual variance without some rows to that with them, below which the rows are
 /// influential even if a misfit remains. Such rows may also be the only ones that an effect
@@ -21,6 +25,69 @@ const ROWS_PER_REMOVAL: usize = 100;
 /// not gross errors and the search ends.
 const MAX_GAINFUL_RATIO: f64 = 0.95;
 
+/// Most influential rows that are not sought as whole views.
+const MAX_SINGLE_ROWS: usize = 4;
+
+/// Finds the influential rows of the fit `found`, or influential views if many rows of images are
+/// influential. `identified` holds the identification rows of the measurements; `without` fits them
+/// except those with the given indices.
+pub(super) fn influential(
+    found: &Identification,
+    (measurements, identified): (&Measurements, &[usize]),
+    without: impl Fn(&[usize]) -> Option<Identification>,
+) -> Option<InfluentialRows> {
+    let rows = influential_rows(found, &without);
+    if rows.as_ref().is_some_and(|rows| rows.rows.len() <= MAX_SINGLE_ROWS) {
+        return rows;
+    }
+    let rows_at = |view: Vec<usize>| view.into_iter().map(|place| identified[place]).collect();
+    let views: Vec<Vec<usize>> = views(measurements, identified).into_iter().map(rows_at).collect();
+    influential_views(found, measurements, &views, without).or(rows)
+}
+
+/// Finds the views without which the declared σ explains the residual, or nearly: the one with the
+/// largest mean square is removed and the others fitted again, until that is so.
+fn influential_views(
+    found: &Identification,
+    measurements: &Measurements,
+    views: &[Vec<usize>],
+    without: impl Fn(&[usize]) -> Option<Identification>,
+) -> Option<InfluentialRows> {
+    let mut removed: Vec<usize> = Vec::new();
+    let mut rows: Vec<Outlier> = Vec::new();
+    let mut reduced_fit: Option<Identification> = None;
+    while MIN_ROWS_PER_INFLUENTIAL * (removed.len() + 1) <= views.len() {
+        let last = reduced_fit.as_ref().unwrap_or(found);
+        if is_explained_by_sigma(last) {
+            break;
+        }
+        let outliers: BTreeMap<usize, &Outlier> =
+            last.outliers.iter().map(|outlier| (outlier.row, outlier)).collect();
+        let square = |view: &usize| {
+            let distances = views[*view].iter().filter_map(|row| outliers.get(row));
+            let sum: f64 = distances.map(|outlier| outlier.distance.powi(2)).sum();
+            sum / views[*view].len() as f64
+        };
+        let left = (0..views.len()).filter(|view| !removed.contains(view) && square(view) > 0.0);
+        let Some(worst) = left.max_by(|a, b| square(a).total_cmp(&square(b))) else { break };
+        let of_view = views[worst].iter().filter_map(|row| outliers.get(row).copied().cloned());
+        rows.extend(of_view);
+        removed.push(worst);
+        let numbers: Vec<usize> = removed.iter().flat_map(|&view| &views[view]).copied().collect();
+        let next = without(&numbers).filter(|fit| fit.termination.converged())?;
+        reduced_fit = Some(next);
+    }
+    let reduced_fit = reduced_fit?;
+    rows.sort_by_key(|outlier| outlier.row);
+    let place = |view: &usize| {
+        let (first, last) = (views[*view].iter().min()?, views[*view].iter().max()?);
+        Some(format!("{} to {}", measurements.location(*first), measurements.location(*last)))
+    };
+    let views = removed.iter().filter_map(place).collect();
+    let influential = InfluentialRows { views, ..outcome(rows, &reduced_fit) };
+    is_decisive(&reduced_fit, found).then_some(influential)
+}
+
 /// Finds the influential rows of the fit `found`; `without` fits the identification rows except
 /// those with the given indices.
 ///
@@ -28,9 +95,9 @@ const MAX_GAINFUL_RATIO: f64 = 0.95;
 /// declared σ explains the residual or no outlier remains. The search ends at a fit that does not
 /// converge. Returns `None` if the declared σ explains the residual of `found`, or if no few rows
 /// cause most of the misfit.
-pub(super) fn influential_rows(
+fn influential_rows(
     found: &Identification,
-    without: impl Fn(&[usize]) -> Option<Identification>,
+    without: &impl Fn(&[usize]) -> Option<Identification>,
 ) -> Option<InfluentialRows> {
     if is_explained_by_sigma(found) {
         return None;
@@ -64,11 +131,20 @@ pub(super) fn influential_rows(
     }
     let reduced_fit = reduced_fit?;
     rows.sort_by_key(|outlier| outlier.row);
-    let ratio = variance_ratio(&reduced_fit, found);
-    let is_better = ratio < MAX_DECISIVE_RATIO
-        || (ratio < MAX_INFLUENTIAL_RATIO && is_explained_by_sigma(&reduced_fit));
-    let Identification { reduced_chi2, sigma_taken, .. } = reduced_fit;
-    is_better.then_some(InfluentialRows { rows, reduced_chi2, sigma_taken })
+    is_decisive(&reduced_fit, found).then(|| outcome(rows, &reduced_fit))
+}
+
+/// Returns true if a fit without some rows explains the others much better than `found` does.
+fn is_decisive(reduced_fit: &Identification, found: &Identification) -> bool {
+    let ratio = variance_ratio(reduced_fit, found);
+    ratio < MAX_DECISIVE_RATIO
+        || (ratio < MAX_INFLUENTIAL_RATIO && is_explained_by_sigma(reduced_fit))
+}
+
+/// Returns influential rows with the residual of the fit without them.
+fn outcome(rows: Vec<Outlier>, reduced_fit: &Identification) -> InfluentialRows {
+    let &Identification { reduced_chi2, sigma_taken, .. } = reduced_fit;
+    InfluentialRows { rows, views: Vec::new(), reduced_chi2, sigma_taken }
 }
 
 /// Returns true if σ is declared and explains the residual: the fit did not assume a larger σ.

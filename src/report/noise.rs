@@ -173,12 +173,12 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
         }
         _ if !is_larger => "so the declared σ is too large".to_owned(),
         Some(influential) => {
-            let cause = match influential.rows.len() {
+            let cause = match influential.is_one() {
                 _ if others_agree_with_sigma(found) => "with gross errors",
-                1 => "that stands out from the others",
-                _ => "that stand out from the others",
+                true => "that stands out from the others",
+                false => "that stand out from the others",
             };
-            let rows = counted(influential.rows.len(), row_noun(found));
+            let rows = influential.counted(row_noun(found));
             format!("mostly because of {rows} {cause}")
         }
         None if rests_on_limits(found) => "so the declared σ is too small, a limit at which the \
@@ -280,11 +280,17 @@ pub(super) fn includes_orientation(found: &Identification, kind: &str) -> bool {
 /// none.
 pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> {
     let influential = found.influential_rows.as_ref()?;
+    let (cause, them) = if influential.is_one() { ("causes", "it") } else { ("cause", "them") };
     let row = |row: &Outlier| {
         format!("{} ({})", row.location, size_of_kind(row.kind, row.error.norm(), 3))
     };
-    let (cause, them) =
-        if influential.rows.len() == 1 { ("causes", "it") } else { ("cause", "them") };
+    let places = match influential.views.len() {
+        0 => joined(influential.rows.iter().map(row), MAX_SHOWN_INFLUENTIAL, ", "),
+        _ => format!(
+            "{}, as if the arm had moved or the joints were of another image",
+            joined(influential.places(), MAX_SHOWN_INFLUENTIAL, ", ")
+        ),
+    };
     let errors = &found.fitted.identification;
     let comparison = match (influential.reduced_chi2, found.reduced_chi2) {
         (Some(without), Some(with)) => {
@@ -297,9 +303,8 @@ pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> 
         ),
     };
     Some(Block::Text(format!(
-        "{} {cause} most of the residual: {}. Without {them} {comparison}.",
-        counted(influential.rows.len(), row_noun(found)),
-        joined(influential.rows.iter().map(row), MAX_SHOWN_INFLUENTIAL, ", ")
+        "{} {cause} most of the residual: {places}. Without {them} {comparison}.",
+        influential.counted(row_noun(found)),
     )))
 }
 
@@ -312,8 +317,13 @@ pub fn influential_rows_advice(found: &Identification, problem: &Path) -> Option
         let place = |row: &Value| Some(format!("{}:{}", row["file"].as_str()?, row["line"]));
         finding.value("rows")?.as_array()?.iter().filter_map(place).collect()
     } else {
-        let rows = found.influential_rows.as_ref()?.rows.iter();
-        rows.map(|row| row.location.to_string()).collect()
+        let influential = found.influential_rows.as_ref()?;
+        if !influential.views.is_empty() {
+            let places = joined(influential.places(), MAX_SHOWN_INFLUENTIAL, ", ");
+            let what = if influential.is_one() { "this view" } else { "these views" };
+            return Some(format!("leave out {what}, or correct the joints there: {places}"));
+        }
+        influential.places()
     };
     let rows = joined(rows, MAX_SHOWN_INFLUENTIAL, ", ");
     Some(format!(

@@ -243,3 +243,23 @@ fn an_error_of_the_lens_is_not_called_one_of_the_arm() {
     let found = identify(&parse(&free), &data, &Options::default()).unwrap();
     assert!(!found.has(FindingCode::LensContradicted) && found.is_trusted());
 }
+
+#[test]
+fn a_view_with_the_joints_of_another_is_named() {
+    let bench = CameraBench::new();
+    let model = model_of(&bench.problem, &bench.rows);
+    let mut rows = measured_with(&model, &bench.rows, &bench.fitted.x, (1.0, 5));
+    let joints = rows.joints;
+    let spoilt = rows.configuration(0).to_vec();
+    let of_view: Vec<usize> =
+        (0..rows.len()).filter(|&row| rows.configuration(row) == spoilt).collect();
+    for &row in &of_view {
+        rows.configurations[row * joints + 3] += 0.02;
+    }
+    let options = Options::default().with_influential_rows();
+    let found = identify(&bench.problem, &split(&bench.problem, rows), &options).unwrap();
+    let finding = found.finding(FindingCode::ViewsDoubted).unwrap();
+    assert!(!found.is_trusted() && finding.to_string().contains("1 view"), "{finding}");
+    let influential = found.influential_rows.unwrap();
+    assert!(influential.rows.iter().all(|row| of_view.contains(&row.row)), "{influential:?}");
+}

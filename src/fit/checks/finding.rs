@@ -27,9 +27,10 @@ pub(super) const OF_MISFIT: [FindingCode; 4] = [
 ];
 
 /// Codes of findings that name a mistake of the input.
-pub(in crate::fit) const MISTAKES: [FindingCode; 7] = [
+pub(in crate::fit) const MISTAKES: [FindingCode; 8] = [
     FindingCode::Misread,
     FindingCode::ViewsReversed,
+    FindingCode::ViewsDoubted,
     FindingCode::ColumnDoubted,
     FindingCode::RowsDoubted,
     FindingCode::RowsChanged,
@@ -146,6 +147,10 @@ finding_codes! {
         "Some views number the points of a marker from the other end.",
         "reverse the column point in these views or leave them out; a board that looks different \
          after half a turn prevents it";
+    ViewsDoubted: Error "views-doubted" ["rows", "reduced_chi2_without"]
+        "A few views of a camera cause most of the misfit: the arm moved while the image was taken, \
+         or the joints are those of another image.",
+        "leave these views out, or correct their joints";
     ColumnDoubted: Error "column-doubted" ["columns", "before", "after"]
         "The fit is far off, and a column of the table stands still, is filled down, is sorted by \
          itself, or is not followed by the positions.",

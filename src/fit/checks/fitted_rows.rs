@@ -27,19 +27,24 @@ pub(super) fn no_outliers(fit: &CheckedFit) -> Option<Finding> {
 const READINGS: [FindingCode; 2] = [FindingCode::Misread, FindingCode::ColumnDoubted];
 
 impl Identification {
-    /// Adds the finding about few rows that cause most of the misfit, and states these rows as its
+    /// Takes over few rows that cause most of the misfit with a finding about them, and states these rows as its
     /// cause in the errors about the misfit. An explanation by another reading of the whole table
     /// is removed if it leaves more error than the fit without these rows. `leading` is the leading
     /// kind of rows.
     pub(in crate::fit) fn state_influential_rows(
         &mut self,
-        influential: &InfluentialRows,
+        influential: InfluentialRows,
         leading: Observation,
     ) {
-        let InfluentialRows { rows, reduced_chi2, sigma_taken } = influential;
-        let text = match rows.len() {
-            1 => "1 row too far off to be noise causes most of the misfit".to_owned(),
-            count => format!("{count} rows too far off to be noise cause most of the misfit"),
+        let InfluentialRows { rows, reduced_chi2, sigma_taken, .. } = &influential;
+        let (cause, them) = if influential.is_one() { ("causes", "it") } else { ("cause", "them") };
+        let counted = influential.counted("row");
+        let mut text = format!("{counted} too far off to be noise {cause} most of the misfit");
+        let code = if influential.views.is_empty() {
+            FindingCode::InfluentialRows
+        } else {
+            text = format!("{text}: {}", listed(&influential.places()));
+            FindingCode::ViewsDoubted
         };
         let without = sigma_taken * leading.expected_norm();
         let is_beaten = |finding: &Finding| {
@@ -50,11 +55,9 @@ impl Identification {
         // Without another error, the fit would be trusted although the rows count in full.
         if others.clone().any(|finding| OF_MISFIT.contains(&finding.code)) {
             let mut findings: Vec<Finding> = others.cloned().collect();
-            let places: Vec<String> = rows.iter().map(|row| row.location.to_string()).collect();
-            let (cause, them) = if rows.len() == 1 { ("causes", "it") } else { ("cause", "them") };
             let remedy = format!(
                 "{} {cause} most of it: correct {them}, or leave {them} out",
-                listed(&places)
+                listed(&influential.places())
             );
             // That finding says also what is wrong in the rows.
             let has_doubted_rows =
@@ -76,7 +79,8 @@ impl Identification {
             self.findings = findings;
         }
         let numbers = [outliers_as_json(rows), json!(reduced_chi2)];
-        self.findings.push(Finding::new(FindingCode::InfluentialRows, numbers, text));
+        self.findings.push(Finding::new(code, numbers, text));
+        self.influential_rows = Some(influential);
     }
 }
 

@@ -47,7 +47,7 @@ mod table_digits;
 mod turned_rows;
 mod turned_target;
 mod two_solutions;
-mod view_order;
+pub(super) mod view_order;
 
 use serde_json::Value;
 

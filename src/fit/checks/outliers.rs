@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use crate::error::Location;
 use crate::fit::uncertainty::residual_lengths::{Lengths, TypicalScatter};
 use crate::measurement::Measurements;
+use crate::quantity::format::counted;
 
 /// Row whose residual is too large to be noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,12 +47,39 @@ impl Outlier {
 pub struct InfluentialRows {
     /// Influential rows, in the order of the table.
     pub rows: Vec<Outlier>,
+    /// First and last row of each view to which the rows belong, if whole views of a camera are
+    /// influential; empty otherwise.
+    pub views: Vec<String>,
     /// Reduced χ² (χ² over its degrees of freedom) of the fit without the influential rows; `None`
     /// if the noise is estimated.
     pub reduced_chi2: Option<f64>,
     /// Standard deviation (1 σ) of a coordinate that the fit without the influential rows assumes
     /// \[m\], for tilts \[rad\].
     pub sigma_taken: f64,
+}
+
+impl InfluentialRows {
+    /// Returns what is influential, such as "1 row" or "2 views".
+    pub fn counted(&self, row: &str) -> String {
+        match self.views.len() {
+            0 => counted(self.rows.len(), row),
+            views => counted(views, "view"),
+        }
+    }
+
+    /// Returns true if one row or one view is influential.
+    pub fn is_one(&self) -> bool {
+        self.places().len() == 1
+    }
+
+    /// Returns the places of the views, or of the rows if single rows are influential.
+    pub fn places(&self) -> Vec<String> {
+        if self.views.is_empty() {
+            self.rows.iter().map(|row| row.location.to_string()).collect()
+        } else {
+            self.views.clone()
+        }
+    }
 }
 
 /// Returns the outliers among `rows`, in the order of the rows. `lengths` and `errors` hold the

@@ -25,7 +25,7 @@ const MAX_LISTED: usize = 5;
 
 /// Groups rows that measure points of one marker in one image: equal camera, marker, session, time
 /// and configuration. Each group holds indices into `rows`; rows of other kinds are left out.
-pub(super) fn views(measurements: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
+pub(in crate::fit) fn views(measurements: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
     let mut views: BTreeMap<_, Vec<usize>> = BTreeMap::new();
     for (place, &row) in rows.iter().enumerate() {
         let observation = measurements.observation(row);
