@@ -72,6 +72,16 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool, reservations: &[Str
         return "No cause is claimed, because the fit is not to be trusted. Correct first what the warnings name.".to_owned();
     }
     let found = found_clause(result);
+    if result.are_rows_apart() {
+        let (rows, verb) = match result.set_aside.len() {
+            1 => ("1 pose".to_owned(), "stands"),
+            rows => (format!("{rows} poses"), "stand"),
+        };
+        return format!(
+            "Unexplained: {rows} {verb} out (gross errors, or a cause acts there). {found}; the \
+             other rows look like noise."
+        );
+    }
     if let (Verdict::Unexplained, Some(size)) = (result.verdict, result.size_alone()) {
         // An interrupted search cannot state that there is no structure.
         let seen = if result.interrupted { "" } else { ", and no structure is seen in it" };

@@ -286,6 +286,16 @@ impl LoopResult {
             && causes().all(is_named)
     }
 
+    /// Returns true if rows that stand out are all that contradicts noise alone.
+    pub(crate) fn are_rows_apart(&self) -> bool {
+        self.verdict == Verdict::Unexplained
+            && (self.trusted && self.tested && !self.interrupted)
+            && !self.set_aside.is_empty()
+            && self.effects.is_empty()
+            && self.unexplained.is_none()
+            && !self.is_contradicted()
+    }
+
     /// Returns the test of the size of the residual against the declared σ, with its χ²/ν; `None`
     /// if the test could not be made.
     fn size_test(&self) -> Option<(&ResidualTest, f64)> {

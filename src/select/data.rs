@@ -48,8 +48,8 @@ pub(super) struct Data<'a> {
 /// Cached laws by key.
 type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
 
-/// Key of cached laws: names of the sites, names of the other hypotheses assumed, poses left out,
-/// and names of the fitted effects.
+/// Key of cached laws: names of the sites, names of the other hypotheses assumed, poses left out
+/// with the rows set aside, and names of the fitted effects.
 type ProposalKey = (String, Vec<String>, Vec<usize>, Vec<String>);
 
 /// Number of points in images that count as one pose in the limit of the rows of evidence. A point

@@ -103,6 +103,10 @@ pub(super) fn max_single_poses(poses: usize) -> usize {
 /// coordinates: ten standard deviations. Effects displace single poses by less, wrong readings by
 /// more.
 pub(super) const OUTLIER_SQUARED_DISTANCE: f64 = 100.0;
+/// Prior probability that a row has a gross error.
+pub(super) const PRIOR_OF_GROSS_ERROR: f64 = 0.01;
+/// ln of the odds (100 to 1) over gross errors at which effects explain the rows that stand out.
+pub(super) const LN_ODDS_OF_COMMON_CAUSE: f64 = 4.6;
 /// Largest fraction of the poses that can be outliers; if more have large residuals, none is an
 /// outlier.
 pub(super) const MAX_OUTLIER_SHARE: f64 = 0.1;

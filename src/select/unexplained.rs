@@ -93,13 +93,13 @@ pub(super) fn without_law(
     let mut listed: Vec<(&Hypothesis, Unexplained)> = Vec::new();
     let are_all_sure = evidence.probability_of_as_many(best) >= data.rules.located;
     for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
-        let claims = evidence.claims(hypothesis);
+        let claims = evidence.claims(hypothesis).with_neighbours(&fitted.problem);
         let is_site_listed = listed.iter().any(|(other, _)| other.site == hypothesis.site);
         if !are_all_sure && (claims.law.1 < data.rules.located || is_site_listed) {
             continue;
         }
         let found = Unexplained {
-            site: Some(hypothesis.site),
+            site: Some(claims.place.0),
             depends_on: hypothesis.depends_on.clone(),
             p_value: evidence.p_value_limit(best).min(odds_against(claims.law.1)),
             claims: Some(claims),

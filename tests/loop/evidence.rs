@@ -242,7 +242,7 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
 }
 
 /// Returns the arm with the masses of its links, or without.
-fn seven(masses: bool) -> Problem {
+pub(super) fn seven(masses: bool) -> Problem {
     use std::fmt::Write as _;
     let mut text = "name = 'seven'\n".to_owned();
     for (alpha, a, d, mass, com) in SEVEN {

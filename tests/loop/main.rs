@@ -14,6 +14,7 @@ mod evidence_laws;
 mod harmonics;
 mod limits;
 mod masses;
+mod rows_apart;
 mod screening;
 mod selection_rules;
 mod stopped;

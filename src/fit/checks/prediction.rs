@@ -2,11 +2,14 @@
 //! larger than those of the nominal arm?
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
+use statrs::distribution::{
+    Binomial, ChiSquared, ContinuousCDF as _, DiscreteCDF as _, FisherSnedecor,
+};
 
 use super::checked_fit::CheckedFit;
 use super::finding::{Finding, FindingCode};
 use super::held_out::mistake;
+use super::outliers::Outlier;
 use super::row_kind::{format_error, row_noun};
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::noise::Noise;
@@ -16,6 +19,13 @@ use crate::problem::Observation;
 
 /// p-value of the held-out residuals below which they contradict the prediction.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
+/// Smallest distance of an outlier, in units of the scatter of a coordinate, that is a gross error
+/// rather than a wrong prediction.
+const MIN_GROSS_DISTANCE: f64 = 10.0;
+/// Probability that a row has a gross error.
+const PROBABILITY_OF_GROSS_ERROR: f64 = 0.01;
+/// Smallest probability of so many gross errors at which they are left out of the test.
+const MIN_CHANCE_OF_ERRORS: f64 = 0.1;
 /// Maximum number of held-out rows that are tested together, which limits the computing time.
 const MAX_TESTED_ROWS: usize = 2048;
 /// Smallest ratio of the mean increase of squared held-out errors to its standard error at which
@@ -34,12 +44,16 @@ const MIN_ROWS: usize = 6;
 ///
 /// The residuals are r ∼ N(0, Σ + J C Jᵀ) with the noise covariance Σ that the fit assumed and the
 /// covariance C of its unknowns. Then χ² = rᵀ(Σ + J C Jᵀ)⁻¹ r has a χ² distribution. If Σ is
-/// estimated, χ² over the number of coordinates has an F distribution. Rows that are reported as
-/// outliers are left out.
+/// estimated, χ² over the number of coordinates has an F distribution. Outliers beyond
+/// [`MIN_GROSS_DISTANCE`] are left out, unless gross errors are improbable in so many rows.
 pub(super) fn prediction_holds(fit: &CheckedFit) -> Option<Finding> {
-    let is_outlier = |row: usize| fit.held_out_outliers.iter().any(|outlier| outlier.row == row);
-    let held_out = fit.fitting.split.held_out.iter().copied();
-    let rows: Vec<usize> = held_out.filter(|row| !is_outlier(*row)).collect();
+    let held_out = &fit.fitting.split.held_out;
+    let is_far = |outlier: &&Outlier| outlier.distance > MIN_GROSS_DISTANCE;
+    let far: Vec<usize> =
+        fit.held_out_outliers.iter().filter(is_far).map(|outlier| outlier.row).collect();
+    let has_errors = is_plausible_number_of_errors(far.len(), held_out.len());
+    let is_used = |row: &usize| !(has_errors && far.contains(row));
+    let rows: Vec<usize> = held_out.iter().copied().filter(is_used).collect();
     let rows = spaced(rows, MAX_TESTED_ROWS);
     let (chi2, coordinates) =
         predictive_chi2(fit.fitting, &rows, &fit.end.x, &fit.whole.unknowns, fit.covariance)?;
@@ -64,6 +78,13 @@ pub(super) fn prediction_holds(fit: &CheckedFit) -> Option<Finding> {
                 .map(|words| format!("{words}; correct these rows, or hold out others")),
         ),
     )
+}
+
+/// Returns true if at least `count` of `of` rows have gross errors with a probability of more than
+/// [`MIN_CHANCE_OF_ERRORS`].
+fn is_plausible_number_of_errors(count: usize, of: usize) -> bool {
+    let fewer = Binomial::new(PROBABILITY_OF_GROSS_ERROR, of as u64);
+    count < 2 || fewer.is_ok_and(|errors| errors.sf(count as u64 - 1) > MIN_CHANCE_OF_ERRORS)
 }
 
 /// Returns the probability that χ² of residuals as large as predicted exceeds `chi2`, and the χ²

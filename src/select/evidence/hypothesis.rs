@@ -22,6 +22,13 @@ pub enum Site {
     Payload,
     /// Tool or its target.
     Tool,
+    /// Last joint, counted from 0, or the tool, which moves the target alike.
+    LastJointOrTool(usize),
+    /// Joint, counted from 0, or a link beside it, which bends under nearly the same loads.
+    JointOrLink(usize),
+    /// Link before the joint with this index, counted from 0, or a joint at its ends, which tilts
+    /// under nearly the same loads.
+    LinkOrJoint(usize),
     /// Hoist that carries part of the weight.
     Hoist,
     /// Arm as a whole.
@@ -72,6 +79,11 @@ impl fmt::Display for Site {
             Self::Base => f.write_str("base"),
             Self::Payload => f.write_str("payload"),
             Self::Tool => f.write_str("tool"),
+            Self::LastJointOrTool(joint) => write!(f, "joint {} or the tool", joint + 1),
+            Self::JointOrLink(joint) => write!(f, "joint {} or a link beside it", joint + 1),
+            Self::LinkOrJoint(joint) => {
+                write!(f, "link before joint {} or a joint at its ends", joint + 1)
+            }
             Self::Hoist => f.write_str("hoist"),
             Self::Arm => f.write_str("arm"),
             Self::Measurement => f.write_str("measurement"),

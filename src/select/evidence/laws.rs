@@ -87,7 +87,8 @@ pub(super) fn promising(
         }
         let fitted_effects = fitted.effects().iter().map(Effect::name_and_place).collect();
         let names = sites.iter().map(|at| at.name.as_str()).collect::<Vec<_>>().join(" ");
-        let key = (names, member_names(hypotheses, &rest), left_out.to_vec(), fitted_effects);
+        let unused = left_out.iter().chain(&fitted.set_aside).copied().collect();
+        let key = (names, member_names(hypotheses, &rest), unused, fitted_effects);
         let proposals = || data.proposed.lock().unwrap_or_else(PoisonError::into_inner);
         let proposed = proposals().get(&key).cloned();
         let proposed = proposed.unwrap_or_else(|| {

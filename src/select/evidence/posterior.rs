@@ -2,7 +2,8 @@
 
 use super::families::OtherHypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, HypothesisSet, Site};
-use crate::problem::Effect;
+use super::sites::tool_joint;
+use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
 
 /// Smallest probability of a set that is kept. Even thousands of less probable sets are negligible
@@ -32,6 +33,37 @@ pub struct Claims {
     /// Hypothesis, and the probability that its law acts at the site without an additional
     /// function.
     pub law: (Hypothesis, f64),
+}
+
+impl Claims {
+    /// Returns the claims with the place extended to neighbours that the hypotheses do not tell
+    /// apart from it.
+    ///
+    /// An error of the last joint that depends on no motion moves the target as a displacement of
+    /// the tool about the joint's axis does. A law of the grammar is then one of two, at either
+    /// part; a law of the catalogue belongs to joints. A free function of the loads at a joint or a
+    /// link has no rivals at the parts beside it, which give way under nearly the same loads.
+    pub(in crate::select) fn with_neighbours(mut self, problem: &Problem) -> Self {
+        let is_motion = |of: &Covariate| {
+            matches!(of, Covariate::Command(_) | Covariate::Approach(_) | Covariate::Velocity)
+        };
+        let effect = self.law.0.effect();
+        let is_of_joint = effect.is_some_and(|effect| !effect.is_composed());
+        let depends_on = &self.depends_on.0;
+        let is_still = !depends_on.is_empty() && !depends_on.iter().any(is_motion);
+        let is_function_of_load =
+            self.law.0.kind == HypothesisKind::Smooth && depends_on.contains(&Covariate::Load);
+        self.place.0 = match self.place.0 {
+            Site::Joint(joint) if joint == tool_joint(problem) && is_still && !is_of_joint => {
+                self.law.1 *= if effect.is_some() { 0.5 } else { 1.0 };
+                Site::LastJointOrTool(joint)
+            }
+            Site::Joint(joint) if is_function_of_load => Site::JointOrLink(joint),
+            Site::LinkBefore(joint) if is_function_of_load => Site::LinkOrJoint(joint),
+            site => site,
+        };
+        self
+    }
 }
 
 /// Returns the odds (1 − p) / p against a claim of probability p, at most 1.
@@ -270,7 +302,36 @@ impl Evidence {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+
+    #[test]
+    fn a_place_is_stated_with_the_neighbours_that_do_the_same() {
+        let text = "name = 'two'\n[[joint]]\nd_m = 0.3\n[[joint]]\na_m = 0.4\n[tool]\ntarget_m = [0.1, 0, 0]\n\
+                    [[effect]]\nlaw = { name = 'slip', at = 'joint2', terms = ['step(t - 10)'] }\n\
+                    [data]\nfiles = ['m.csv']\nposition_sigma_mm = 0.1\n";
+        let problem = Problem::parse(text, Path::new("problem.toml")).unwrap();
+        let stated = |kind: HypothesisKind, site: Site, covariate: Covariate| {
+            let law = (Hypothesis::new(kind, site, None, vec![covariate.clone()]), 0.96);
+            let claims = Claims { place: (site, 1.0), depends_on: (vec![covariate], 1.0), law };
+            let claims = claims.with_neighbours(&problem);
+            format!("{} {:.2}", claims.place.0, claims.law.1)
+        };
+        let smooth = |site, covariate| stated(HypothesisKind::Smooth, site, covariate);
+        assert_eq!(smooth(Site::Joint(1), Covariate::Time), "joint 2 or the tool 0.96");
+        assert_eq!(smooth(Site::Joint(1), Covariate::Command(0)), "joint 2 0.96");
+        assert_eq!(smooth(Site::Joint(0), Covariate::Time), "joint 1 0.96");
+        assert_eq!(smooth(Site::Joint(0), Covariate::Load), "joint 1 or a link beside it 0.96");
+        let link = smooth(Site::LinkBefore(1), Covariate::Load);
+        assert_eq!(link, "link before joint 2 or a joint at its ends 0.96");
+        let law = |effect: Effect| {
+            stated(HypothesisKind::Effect(effect), Site::Joint(1), Covariate::Time)
+        };
+        assert_eq!(law(problem.effects[0].effect.clone()), "joint 2 or the tool 0.48");
+        let harmonic = Effect::JointHarmonic { joint: 2, orders: vec![1] };
+        assert_eq!(law(harmonic), "joint 2 0.96");
+    }
 
     #[test]
     fn what_stands_for_one_effect_is_none_of_the_others_with_it() {

@@ -38,8 +38,12 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
 /// Returns the site of a displacement of the tool along an axis, 0 to 2, in the frame of the joint
 /// that carries it.
 pub(super) fn tool_site(problem: &Problem, axis: usize) -> ParameterSite {
-    let joint = problem.tool.joint.min(problem.joints.len().saturating_sub(1));
-    ParameterSite::Joint { joint, field: JointField::After(axis) }
+    ParameterSite::Joint { joint: tool_joint(problem), field: JointField::After(axis) }
+}
+
+/// Returns the joint, from 0, that carries the tool.
+pub(super) fn tool_joint(problem: &Problem) -> usize {
+    problem.tool.joint.min(problem.joints.len().saturating_sub(1))
 }
 
 /// Returns the sites of changes of the focal lengths and centres of all cameras, with their names in

@@ -6,11 +6,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
-use super::excluded_rows::withhold_claims;
-use super::found::{Found, found};
+use super::excluded_rows::{searched_with_all_rows, withhold_claims};
+use super::found::{Found, found, lower_contradicted};
 use super::gravity::other_gravity;
 use super::misread_effect::with_misread_effect;
-use super::search::search;
+use super::search::{Searched, search};
 use super::state::{Round, SearchState};
 use super::status::{Status, Verdict};
 use crate::error::Location;
@@ -156,12 +156,7 @@ pub fn close_by(
     let declared = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&declared, &data);
     let mut state = SearchState::new(&stoppable, options, &declared);
-    let result = if no_effect_explains(&declared) {
-        Ok((declared.clone(), None))
-    } else {
-        with_misread_effect(&mut state, &declared)
-            .and_then(|first| search(&mut state, first.unwrap_or_else(|| declared.clone())))
-    };
+    let result = search_effects(&mut state, &declared);
     let interrupted = result.as_ref().is_err_and(IdentifyError::is_interrupted);
     options.report_progress(|| Progress::Finishing);
     state.data = &data;
@@ -208,9 +203,12 @@ pub fn close_by(
     }
     let set_aside = set_aside(&fitted, evidence.as_ref(), &data);
     let is_noise = unexplained.is_empty() && !is_contradicted(&fitted.found);
-    let claims = (is_noise && problem.robust.is_none()).then_some(effects.as_mut_slice());
-    let excluded = withhold_claims(&fitted.found, &set_aside, claims);
-    let is_noise = is_noise && excluded.is_none();
+    let (is_spoilt, excluded) = if is_noise && problem.robust.is_none() {
+        withhold_claims(&fitted.found, &set_aside, &mut effects)
+    } else {
+        (false, None)
+    };
+    let is_noise = is_noise && !is_spoilt;
     let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
     let is_noise_with_found =
         is_noise && with_found.as_ref().is_none_or(|sure| !check_fit(sure, &data).is_structured());
@@ -248,7 +246,8 @@ pub fn close_by(
     let is_open =
         (verdict == Verdict::Unexplained || has_formula) && !interrupted && excluded.is_none();
     let gravity = is_open.then(|| other_gravity(&state, &declared, &fitted)).flatten();
-    let verdict = if gravity.is_some() { locate_composed(&mut effects) } else { verdict };
+    let verdict = if gravity.is_some() { Verdict::Unexplained } else { verdict };
+    lower_contradicted(&mut effects, &fitted.found, (gain, gravity.is_some()));
     let mut after = fitted.found;
     after.findings.splice(0..0, orientations.into_iter().chain(gravity).chain(excluded));
     if !interrupted {
@@ -272,6 +271,16 @@ pub fn close_by(
         rules: rules.clone(),
         found_alone,
     })
+}
+
+/// Runs the search from the fit of the declared problem, unless no effect can explain its residual.
+fn search_effects(state: &mut SearchState, declared: &Fitted) -> Result<Searched, IdentifyError> {
+    if no_effect_explains(declared) {
+        return Ok((declared.clone(), None));
+    }
+    let first = with_misread_effect(state, declared)?.unwrap_or_else(|| declared.clone());
+    let end = search(state, first)?;
+    searched_with_all_rows(state, declared, end)
 }
 
 /// Returns the places of the rows that were excluded from the choice of effects: those with gross
@@ -467,13 +476,4 @@ fn mean_gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> In
     let sums: Vec<(f64, f64)> =
         groups.values().map(|gains| (gains.iter().sum::<f64>(), gains.len() as f64)).collect();
     mean_interval(&sums, RESAMPLES, INTERVAL_LEVEL, data.rules.seed)
-}
-
-/// Lowers composed laws to located effects, because another direction of gravity explains as much.
-/// Returns the verdict with it.
-fn locate_composed(effects: &mut [Found]) -> Verdict {
-    for found in effects.iter_mut().filter(|found| found.effect.is_composed()) {
-        found.status = Status::Located;
-    }
-    Verdict::Unexplained
 }

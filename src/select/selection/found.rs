@@ -7,7 +7,8 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 use super::misread_effect::misread_claims;
 use super::state::{Round, SearchState};
 use super::status::Status;
-use crate::fit::{ErrorSummary, Estimate};
+use crate::fit::{ErrorSummary, Estimate, FindingCode, Identification};
+use crate::numeric::Interval;
 use crate::problem::{Effect, PoseView};
 use crate::residual_tests::Covariate;
 use crate::select::candidates::Candidates;
@@ -164,7 +165,7 @@ pub(super) fn found(
         let misread = state.misread.as_ref().filter(|misread| misread.effect == effect);
         let claims = match misread {
             Some(misread) => Some(misread_claims(misread, &fitted.problem)),
-            None => claims,
+            None => claims.map(|claims| claims.with_neighbours(&fitted.problem)),
         };
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear_probability);
         let law = law.or_else(|| is_evaluated.then_some(0.0));
@@ -407,6 +408,27 @@ fn compare_with_plainer(state: &SearchState, fitted: &Fitted) -> Vec<Plainer> {
         Some(Plainer { effect: effect.clone(), instead, share })
     };
     added.iter().filter_map(compared).collect()
+}
+
+/// Lowers the status of effects to `at_most`, unless it is lower.
+pub(super) fn lower<'a>(effects: impl Iterator<Item = &'a mut Found>, at_most: Status) {
+    effects.for_each(|found| found.status = found.status.max(at_most));
+}
+
+/// Lowers the status of effects that data contradict: of all, to probable, if held-out rows
+/// contradict the fit and do not `gain` beyond chance; of composed laws, to located, if another
+/// direction of gravity explains as much.
+pub(super) fn lower_contradicted(
+    effects: &mut [Found],
+    fit: &Identification,
+    (gain, has_other_gravity): (Interval, bool),
+) {
+    if fit.has(FindingCode::HeldOutBeyondPrediction) && gain.low <= 0.0 {
+        lower(effects.iter_mut(), Status::Probable);
+    }
+    if has_other_gravity {
+        lower(effects.iter_mut().filter(|found| found.effect.is_composed()), Status::Located);
+    }
 }
 
 /// Returns the recorded quantities on which an effect depends, with their ranges over the

@@ -64,7 +64,9 @@ impl ClosedLoop {
     fn with_found_alone(self, alone: FoundAlone) -> Self {
         let FoundAlone { mut found, problem, residual_tests, gain } = alone;
         let (mut effects, others): (Vec<Found>, Vec<Found>) =
-            self.effects.into_iter().partition(|found| found.status == Status::Found);
+            self.effects.into_iter().partition(|found| {
+                problem.effects.iter().any(|declared| declared.effect.covers(&found.effect))
+            });
         for effect in &mut effects {
             for estimate in &mut effect.estimates {
                 let refitted = found.estimates.iter().find(|other| other.name == estimate.name);

@@ -16,6 +16,9 @@ use crate::select::harmonic_prior::is_periodic_of_many_orders;
 use crate::select::neighbourhood::{Linearised, Score};
 use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_RIVALS, MAX_SHIFT_TIMES};
 
+/// End of a search: its final fit, and the evidence about it.
+pub(super) type Searched = (Fitted, Option<Evidence>);
+
 /// Runs the search from the fit of the declared problem.
 ///
 /// Returns the final, converged fit and the evidence about it. The evidence is `None` if the
@@ -25,10 +28,7 @@ use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_RIVALS, MAX_SHIFT
 ///
 /// # Errors
 /// Returns an error if a fit fails or the search was stopped.
-pub(super) fn search(
-    state: &mut SearchState,
-    first: Fitted,
-) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
+pub(super) fn search(state: &mut SearchState, first: Fitted) -> Result<Searched, IdentifyError> {
     let (fitted, evidence) = settled_set(state, first)?;
     if state.added(&fitted).iter().any(is_periodic_of_many_orders) {
         let used = with_estimated_prior(state, &fitted, ScaleBy::LeftOutRanges)?;
@@ -41,10 +41,7 @@ pub(super) fn search(
 
 /// Alternates between evaluating evidence and fitting the effects of the most probable set, until
 /// both agree or the rounds are used up. Returns the last fit and the evidence about it.
-fn settled_set(
-    state: &mut SearchState,
-    first: Fitted,
-) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
+fn settled_set(state: &mut SearchState, first: Fitted) -> Result<Searched, IdentifyError> {
     let rules = state.data.rules;
     let mut fitted = first;
     // This evidence compared each set at a fit of that set and selected the set of the present
@@ -222,7 +219,10 @@ fn is_confirmed(
 }
 
 /// Returns the result of `evaluate`, or an error if the search was stopped in the meantime.
-fn unless_stopped<T>(data: &Data, evaluate: impl FnOnce() -> T) -> Result<T, IdentifyError> {
+pub(super) fn unless_stopped<T>(
+    data: &Data,
+    evaluate: impl FnOnce() -> T,
+) -> Result<T, IdentifyError> {
     let value = evaluate();
     if data.stop.is_requested() { Err(IdentifyError::interrupted()) } else { Ok(value) }
 }
