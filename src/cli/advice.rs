@@ -173,9 +173,7 @@ pub fn after_fit(
         {
             search
         }
-        None if found.has(FindingCode::HeldOutNotBetter) => {
-            format!("keep the nominal arm, or flexcal next {named} chooses more poses to measure")
-        }
+        None if found.has(FindingCode::HeldOutNotBetter) => keep_nominal(&named),
         None if found.has(FindingCode::HeldOutOutliers) => {
             format!("check the held-out rows that the warning names; if they are right, {search}")
         }
@@ -194,6 +192,11 @@ pub fn after_fit(
         }
         None => to_apply("corrects commands"),
     }
+}
+
+/// States what to do if the fit predicts held-out rows worse than the nominal arm does.
+fn keep_nominal(named: &str) -> String {
+    format!("keep the nominal arm, or flexcal next {named} chooses more poses to measure")
 }
 
 /// States what to do about a prior that contradicts the data.
@@ -271,6 +274,9 @@ pub fn after_loop(
             "flexcal identify {named} -v shows how far the error would fall if a limit moved out; \
              widen those that may be wrong"
         );
+    }
+    if after.has(FindingCode::HeldOutNotBetter) {
+        return keep_nominal(&named);
     }
     if result.is_contradicted() {
         if result.effects.is_empty() && !problem.effects.is_empty() {

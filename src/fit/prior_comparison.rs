@@ -39,6 +39,21 @@ pub(crate) struct PriorComparison {
     pub parameters: Vec<ComparedParameter>,
 }
 
+/// Smallest p-value of the new rows at which they do not contradict the prior.
+const MIN_AGREEING_P: f64 = 0.001;
+
+impl PriorComparison {
+    /// Returns the p-value of new rows that contradict the prior by χ²; `None` if they do not.
+    pub fn contradicting_p(&self) -> Option<f64> {
+        self.chi2.map(|(.., p)| p).filter(|p| *p < MIN_AGREEING_P)
+    }
+
+    /// Returns true if the new rows contradict the prior, by χ² or by a change that was found.
+    pub fn is_contradicted(&self) -> bool {
+        self.contradicting_p().is_some() || self.has_raised_sigma || !self.causes.is_empty()
+    }
+}
+
 /// Parameter with its prior, the estimate from the new rows alone, and its posterior; SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ComparedParameter {

@@ -12,15 +12,12 @@ use super::remainder::{HELD_OUT, PredictionAccuracy, exceed};
 use crate::fit::{FindingCode, Identification, Noise, Outlier, TypicalScatter, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, mm, number};
-use crate::results::{ResidualSize, rows_in};
+use crate::results::{ResidualSize, Trust, exceeds_noise, raised_variance, rows_in};
 
 /// Maximum number of outliers that a text lists.
 const MAX_SHOWN_OUTLIERS: usize = 20;
 /// Maximum number of influential rows that a text names.
 const MAX_SHOWN_INFLUENTIAL: usize = 3;
-/// Largest ratio of the noise variance that a fit with a prior assumes to the declared one, at which
-/// they are equal but for rounding.
-const MAX_EQUAL_VARIANCE_RATIO: f64 = 1.0 + 1e-9;
 /// Largest χ²/ν that noise alone gives in 99.9 % of cases, up to which a χ²/ν within the interval
 /// shows that the model explains the data.
 const MAX_TELLING_CHANCE: f64 = 1.8;
@@ -103,12 +100,8 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
 /// States the size of the residual if the fit took a larger σ than the declared one because of its
 /// prior; `None` if it did not.
 fn raised_sigma(found: &Identification) -> Option<String> {
-    let prior = found.prior.as_ref().filter(|prior| prior.estimated_sigma.is_none())?;
-    let (chi2, ratio) = (found.reduced_chi2?, prior.variance_ratio);
-    if ratio <= MAX_EQUAL_VARIANCE_RATIO {
-        return None;
-    }
-    let reason = if prior.has_raised_sigma {
+    let (chi2, ratio) = (found.reduced_chi2?, raised_variance(found)?);
+    let reason = if found.prior.as_ref().is_some_and(|prior| prior.has_raised_sigma) {
         "the new rows contradict the prior"
     } else {
         "the earlier estimate was fitted with it"
@@ -121,12 +114,6 @@ fn raised_sigma(found: &Identification) -> Option<String> {
         expected_interval(found),
         number(ratio.sqrt(), 1)
     ))
-}
-
-/// Returns the ratio of the σ that a fit with a prior assumes to the declared one, if it is larger.
-fn assumed_sigma_ratio(found: &Identification) -> Option<f64> {
-    let prior = found.prior.as_ref().filter(|prior| prior.estimated_sigma.is_none())?;
-    (prior.variance_ratio > MAX_EQUAL_VARIANCE_RATIO).then(|| prior.variance_ratio.sqrt())
 }
 
 /// States the interval that contains χ²/ν with 99.9 % probability if only noise is left.
@@ -384,7 +371,7 @@ pub(super) fn reservations(
         .collect()
 }
 
-/// States whether the fit is to be trusted, with what contradicts it, the held-out error before and
+/// States what of the fit is to be trusted, with what contradicts it, the held-out error before and
 /// after it, and how much its residual exceeds the declared noise. A fit whose residual cannot
 /// contradict it, because priors decide most of it, is not said to be trusted.
 pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccuracy>) -> String {
@@ -394,10 +381,6 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     let [before, fitted] = [&found.registered, &found.fitted].map(|errors| &errors.held_out);
     let corrected = accuracy.and_then(|accuracy| accuracy.corrected.as_ref());
     let after = corrected.unwrap_or(fitted);
-    let is_larger = match ResidualSize::of(found) {
-        ResidualSize::Contradicted(chi2) | ResidualSize::Unclear(chi2) => chi2 > 1.0,
-        _ => false,
-    };
     let reservations = reservations(found, accuracy);
     let unjudged = found.finding(FindingCode::PriorsDecide).and_then(|few| {
         Some(format!(
@@ -407,6 +390,7 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
             counted(few.count("poses")?, "different pose")
         ))
     });
+    let larger = larger_residual(found, corrected.is_some()).filter(|_| unjudged.is_none());
     let reserved = if reservations.is_empty() {
         String::new()
     } else {
@@ -416,19 +400,6 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         let judged = if reserved.is_empty() { "The fit is to be trusted" } else { CONVERGED };
         return format!("{}{reserved}.", unjudged.unwrap_or_else(|| judged.to_owned()));
     }
-    let raised = assumed_sigma_ratio(found);
-    let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
-    let scope = if (is_larger || raised.is_some()) && has_bound && reservations.is_empty() {
-        " within the error bound below"
-    } else {
-        ""
-    };
-    let size = if found.noise_factor > 1.0 {
-        format!("{} × the declared σ", number(found.noise_factor.sqrt(), 1))
-    } else {
-        "larger than the declared σ explains".to_owned()
-    };
-    let of = if corrected.is_some() { " without the remainder" } else { "" };
     let without = if corrected.is_some() {
         format!(" ({} without the remainder)", with_unit(fitted, fitted.mean.norm))
     } else {
@@ -442,24 +413,54 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     } else {
         format!("rises from {from} to {to}")
     };
-    let judged = unjudged.unwrap_or_else(|| match reserved.as_str() {
-        _ if found.unknowns.is_empty() => {
-            "No parameter is free, so that the nominal arm is judged".to_owned()
+    let is_free = !found.unknowns.is_empty();
+    let trust = Trust::of(found, accuracy.is_some_and(|of| of.contradicted.is_some()));
+    let judged = match &larger {
+        Some(larger) if is_free && trust == Trust::Predictions => {
+            let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
+            let what = if has_bound {
+                "Predictions are trusted within the error bound below, single parameters are not"
+            } else {
+                "Converged, but single parameters are not to be trusted"
+            };
+            format!("{what}: {larger}")
         }
-        "" => format!("Trusted{scope}"),
-        _ => CONVERGED.to_owned(),
-    });
-    // The change of the error is the ground of trust, but of no reservation.
-    let the = if reserved.is_empty() { ": the" } else { ". The" };
+        _ => unjudged.unwrap_or_else(|| match reserved.as_str() {
+            _ if !is_free => "No parameter is free, so that the nominal arm is judged".to_owned(),
+            "" => "Trusted".to_owned(),
+            _ => CONVERGED.to_owned(),
+        }),
+    };
+    // The change of the error is the ground of trust in all, but of no reservation.
+    let (the, left) = match larger {
+        Some(_) if is_free && trust == Trust::Predictions => (". The", String::new()),
+        larger => (
+            if reserved.is_empty() { ": the" } else { ". The" },
+            larger.map_or_else(String::new, |words| format!(" Not fully explained: {words}.")),
+        ),
+    };
     format!(
-        "{judged}{reserved}{the} mean {} error {change}{without}.{}",
-        test_rows_word(&found.fitted).replace(' ', "-"),
-        if is_larger {
-            format!(" Not fully explained: the residual{of} is {size}.")
-        } else if let Some(ratio) = raised {
-            format!(" Not fully explained: the fit assumes {} × the declared σ.", number(ratio, 1))
-        } else {
-            String::new()
-        }
+        "{judged}{reserved}{the} mean {} error {change}{without}.{left}",
+        test_rows_word(&found.fitted).replace(' ', "-")
     )
+}
+
+/// States how much the residual, that without the remainder if `is_corrected`, exceeds the declared
+/// σ, and what follows for the parameters; `None` if it does not exceed it.
+fn larger_residual(found: &Identification, is_corrected: bool) -> Option<String> {
+    let of = if is_corrected { " without the remainder" } else { "" };
+    let times = |ratio: f64| format!("{} × the declared σ", number(ratio, 1));
+    let size = if !exceeds_noise(found) {
+        format!("the fit assumes {}", times(raised_variance(found)?.sqrt()))
+    } else if found.noise_factor > 1.0 {
+        format!("the residual{of} is {}", times(found.noise_factor.sqrt()))
+    } else {
+        format!("the residual{of} is larger than the declared σ explains")
+    };
+    let what = if found.unknowns.is_empty() {
+        ""
+    } else {
+        ", and parameters may have absorbed what the model lacks"
+    };
+    Some(size + what)
 }

@@ -7,7 +7,7 @@ use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
 use crate::problem::{JointKind, Problem};
 use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash, two_digits};
-use crate::results::{Knowledge, LargestHarmonics};
+use crate::results::{Knowledge, LargestHarmonics, exceeds_noise};
 
 /// Number of decimals of a value without a standard error.
 const DEFAULT_DECIMALS: usize = 4;
@@ -76,6 +76,11 @@ pub(super) fn parameters<'a>(
         "but vaguely: no standard error, or one above 1°, 10 mm or half of the stiffness".to_owned()
     }));
     notes.extend(rows_of_sheet(problem));
+    notes.extend(exceeds_noise(found).then(|| {
+        "standard errors assume that the model lacks nothing; the residual is larger than the declared σ explains, so that parameters \
+         may be off by many of them"
+            .to_owned()
+    }));
     notes.extend(suggested_prior_sigmas(&found.prior_sizes).filter(|_| found.is_trusted()));
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];
     if count > 0 {

@@ -11,8 +11,6 @@ use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash, 
 /// Header of the table of parameters.
 const HEADER: [&str; 7] =
     ["parameter", "prior", "± 1 σ", "new rows", "± 1 σ", "posterior", "± 1 σ"];
-/// p-value of χ² below which a text does not say that the new rows agree with the prior.
-const MIN_AGREEING_P: f64 = 0.001;
 /// Largest standard error by the new rows, in units of the earlier one, at which the figure shows a
 /// parameter. Above it the new rows add hardly any information.
 const MAX_DRAWN_ERROR: f64 = 10.0;
@@ -85,7 +83,9 @@ pub(super) fn summary(found: &Identification, comparison: &PriorComparison) -> S
     }
     let verdict = match comparison.causes.as_slice() {
         [] => match comparison.chi2 {
-            Some((.., p)) if p >= MIN_AGREEING_P => ". No contradiction is shown.".to_owned(),
+            Some(_) if comparison.contradicting_p().is_none() => {
+                ". No contradiction is shown.".to_owned()
+            }
             Some(_) => ". That is improbable, but no single cause explains it.".to_owned(),
             None => ". Their agreement could not be tested.".to_owned(),
         },
@@ -97,7 +97,7 @@ pub(super) fn summary(found: &Identification, comparison: &PriorComparison) -> S
         causes => {
             // χ² counts all coordinates alike, so that a small change of one kind may leave it as
             // expected.
-            let is_hidden = comparison.chi2.is_some_and(|(.., p)| p >= MIN_AGREEING_P);
+            let is_hidden = comparison.chi2.is_some() && comparison.contradicting_p().is_none();
             let but = if is_hidden { ", but the test for single causes finds one" } else { "" };
             format!(
                 "{but}. They disagree. Most probable of the changes that are tried: {}.",
@@ -120,11 +120,10 @@ pub fn is_prior_contradicted(found: &Identification) -> bool {
 /// States that the new rows contradict the earlier estimate; `None` if they do not.
 pub(super) fn contradiction(comparison: &PriorComparison) -> Option<String> {
     let words = "the new rows contradict the prior";
-    match comparison.chi2 {
-        Some((.., p)) if p < MIN_AGREEING_P => Some(format!("{words} (p {})", p_value(p))),
-        _ if comparison.has_raised_sigma || !comparison.causes.is_empty() => Some(words.to_owned()),
-        _ => None,
-    }
+    comparison.is_contradicted().then(|| match comparison.contradicting_p() {
+        Some(p) => format!("{words} (p {})", p_value(p)),
+        None => words.to_owned(),
+    })
 }
 
 fn row(compared: &ComparedParameter) -> Vec<String> {

@@ -185,6 +185,10 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
 /// Smallest share of the workspace far from all measured poses that the summaries state \[%\].
 const MIN_SAID_FAR_PERCENT: f64 = 1.0;
 
+/// Largest probability that chance alone leaves as few held-out configurations within their bounds,
+/// at which the summaries state it.
+const MAX_SAID_CHANCE: f64 = 0.05;
+
 /// Name of the configurations that no fit uses.
 pub(super) const HELD_OUT: &str = "held-out configurations";
 
@@ -235,7 +239,9 @@ impl PredictionAccuracy {
         } else {
             format!(", of which {} % is far from all measured poses", number(far, 0))
         };
-        let mut kept = contradicted_bound(uncertainty.test.as_ref(), HELD_OUT);
+        let is_doubtful = |test: &&BoundTest| test.widened > 1.0 || test.chance() < MAX_SAID_CHANCE;
+        let doubtful = uncertainty.test.as_ref().filter(is_doubtful);
+        let mut kept = chance_of_bound(doubtful, HELD_OUT, false);
         let errors = held_out.as_ref().unwrap_or(&found.fitted.held_out);
         if kept.is_empty() && found.has(FindingCode::HeldOutOutliers) {
             let [rms, max] = [errors.rms.norm, errors.max.norm].map(|of| number(of * 1e3, 2));

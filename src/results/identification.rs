@@ -12,6 +12,7 @@ use super::document::json_rows;
 use super::prior::PriorUse;
 use super::remainder::{self, Remainder};
 use super::summary::{Errors, KindErrors, in_mm_deg_px};
+use super::trust::Trust;
 use crate::fit::{
     self, ActiveConstraint, Estimate, Finding, Identification, InfluentialRows, Noise,
     OrientationErrors, Outlier, PointSpread, ShadowPrice,
@@ -21,7 +22,7 @@ use crate::least_squares::{Identifiability, UnidentifiableCombination};
 use crate::observation::kind_named;
 use crate::problem::Problem;
 use crate::quantity::Unit;
-use crate::remainder::Fitted;
+use crate::remainder::{BoundTest, Fitted};
 
 /// Identified arm. Values are in SI units unless the key names another unit.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -36,7 +37,9 @@ pub struct IdentificationResult {
     /// Reason for which `auto` chose the solver; null if the user named it.
     pub solver_reason: Option<&'static str>,
     pub termination: &'static str,
+    /// True if no finding is an error.
     pub trusted: bool,
+    pub(crate) verdict: Trust,
     pub iterations: u64,
     pub alternation: Option<Alternation>,
     pub seconds: f64,
@@ -310,6 +313,7 @@ impl IdentificationResult {
             solver_reason: found.solver_reason,
             termination: found.termination.as_str(),
             trusted: found.is_trusted(),
+            verdict: Trust::of(found, false),
             iterations: found.iterations,
             alternation: found.alternation.map(|fit::Alternation { sweeps, contraction }| {
                 Alternation { sweeps: sweeps as u64, contraction }
@@ -371,6 +375,7 @@ impl IdentificationResult {
     #[doc(hidden)]
     pub fn with_predictions(self, found: &Identification, fitted: &Fitted) -> Self {
         let corrected = fitted.residuals.as_ref();
+        let exceeds_bounds = fitted.held_out_test.as_ref().is_some_and(BoundTest::is_contradicted);
         Self {
             fitted: corrected.map_or(self.fitted, |corrected| Errors::of(&corrected.errors)),
             // With a prior, the covariance of the fit itself contains all earlier rows.
@@ -380,6 +385,7 @@ impl IdentificationResult {
                 covariance_of_predictions(found)
                     .unwrap_or_else(|| remainder::covariance(found, fitted))
             },
+            verdict: Trust::of(found, exceeds_bounds),
             remainder: Remainder::new(found, fitted),
             prediction: remainder::prediction(fitted),
             ..self

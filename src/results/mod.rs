@@ -33,6 +33,7 @@ mod study;
 mod summary;
 pub(crate) mod tables;
 mod trace;
+mod trust;
 mod watch;
 
 pub(crate) use acceptance::{AcceptanceRecord, AcceptanceResult, PoseAccuracy, TestedTolerance};
@@ -92,6 +93,7 @@ pub use self::{
 #[doc(hidden)]
 pub use crate::files::{FORMAT_VERSION, PROGRAM};
 pub(crate) use tables::pose_columns;
+pub(crate) use trust::{Trust, raised_variance};
 
 /// Implements [`Document`] for each result with the name of its format, and lists the schemas.
 macro_rules! documents {

@@ -261,3 +261,47 @@ fn held_out_poses_of_an_arm_with_hysteresis_keep_their_past() {
     let watched = folder.flexcal("watch . --estimate id/estimate.json --out watched").success();
     assert_contains(&watched.stdout, &["No change shown", "42 rows left out"]);
 }
+
+#[test]
+fn a_residual_beyond_the_declared_sigma_leaves_predictions_to_be_trusted_alone() {
+    let folder = Folder::with_lunar_sampler();
+    let identify = |data: &str| {
+        folder.copy(&format!("tests/cases/{data}.csv"), "a-none.csv");
+        let said = folder.flexcal("identify . --out out -v").success().words();
+        let json = folder.json("out/estimate.json");
+        assert_eq!(json["trusted"], true);
+        (said, json["verdict"].as_str().unwrap().to_owned())
+    };
+    let doubt = "standard errors assume that the model lacks nothing";
+    let (said, verdict) = identify("d-backlash");
+    let head = "Predictions are trusted within the error bound below, single parameters are not: the residual is";
+    assert_contains(&said, &[head, "may have absorbed what the model lacks. The mean", doubt]);
+    assert_eq!(verdict, "predictions");
+    let (said, verdict) = identify("a-none");
+    assert!(said.contains("Trusted: the mean") && !said.contains(doubt), "{said}");
+    assert_eq!(verdict, "trusted");
+}
+
+#[test]
+fn a_loop_says_what_held_out_rows_say_of_its_fit() {
+    let folder = Folder::new();
+    folder.copy("problems/scara/problem.toml", "problem.toml");
+    folder.copy("problems/scara/TRUTH.toml", "TRUTH.toml");
+    // A true arm, of which a fit to 10 poses can only make a worse one.
+    folder.map("TRUTH.toml", |text| {
+        let (_, rest) = text.split_once("[noise]").unwrap();
+        format!("[noise]{rest}")
+    });
+    folder.edit("problem.toml", "{ column = \"split\" }", "{ fraction = 0.6, seed = 1 }");
+    folder.simulate(".", "TRUTH.toml", 24, 1, "measurements.csv");
+    let keep = "Next: keep the nominal arm, or flexcal next . chooses";
+    for command in ["identify", "loop"] {
+        let run = folder.flexcal(&format!("{command} . --out {command}")).success();
+        assert_contains(&run.words(), &["the fit made held-out errors worse", keep]);
+    }
+    assert_eq!(folder.json("identify/estimate.json")["verdict"], "contradicted");
+    let folder = Folder::with_lunar_sampler();
+    folder.copy("tests/cases/f-two.csv", "a-none.csv");
+    let few = "39 of 50 held-out configurations lie within their bounds; as few or fewer do so by chance in";
+    assert_contains(&folder.flexcal("loop . --out out").success().words(), &[few]);
+}
