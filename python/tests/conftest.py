@@ -78,5 +78,6 @@ def timeless(text: str) -> Any:
     """A result without the time that it took."""
     document = json.loads(text)
     document.pop("seconds", None)
-    document.get("digest", {}).pop("seconds", None)
+    for key in ("seconds", "digest"):
+        document.get("digest", {}).pop(key, None)
     return document

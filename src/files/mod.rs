@@ -21,7 +21,7 @@ pub(crate) use latin::windows_1252;
 pub use lock::{FolderLock, MAX_LOCK_WAIT};
 pub use record::{FolderRecord, digest, was_changed};
 pub use sealed::Changes;
-pub(crate) use sealed::{DIGEST_KEY, changed_key, sealed};
+pub(crate) use sealed::{DIGEST_KEY, changed_key, digest_of_values, sealed};
 pub use staged::write_new;
 
 /// Reads a file of at most `max_bytes` bytes; see [`open`] for the files that are refused.

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use serde_json::value::RawValue;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::digest;
 
 /// Key of the digests in a file. Its value is an object with one digest for every other key of the
-/// file.
+/// file, and under the same key one of all these digests.
 pub(crate) const DIGEST_KEY: &str = "digest";
 /// Number of hexadecimal digits of a digest, enough to detect accidental changes.
 const DIGEST_DIGITS: usize = 16;
@@ -36,7 +36,8 @@ struct Format {
 /// Returns the JSON object `text` with the digests of its values under an additional last key. A
 /// text that is no JSON object is returned unchanged.
 pub(crate) fn sealed(text: &str) -> String {
-    let Ok(digests) = digests(text) else { return text.to_owned() };
+    let Ok(mut digests) = digests(text) else { return text.to_owned() };
+    digests.insert(DIGEST_KEY.to_owned(), of_all(&digests));
     let body = text.trim_end().strip_suffix('}').unwrap_or(text).trim_end();
     let digests = serde_json::to_string_pretty(&digests).unwrap_or_default();
     let digests = digests.replace('\n', "\n  ");
@@ -45,7 +46,8 @@ pub(crate) fn sealed(text: &str) -> String {
 
 /// Returns the first key of a JSON object whose value differs from the one that [`sealed`] wrote,
 /// or that was added or removed. If the digests were removed from a file of a format that has them,
-/// returns their key. Returns `None` if nothing changed.
+/// or if some values are those of another file, returns the key of the digests. Returns `None` if
+/// nothing changed.
 ///
 /// # Errors
 /// Returns an error if the text is no JSON object.
@@ -59,21 +61,41 @@ pub(crate) fn changed_key(text: &str) -> serde_json::Result<Option<String>> {
         let is_sealed = format.is_some_and(|format| format.version >= FIRST_SEALED_VERSION);
         return Ok(is_sealed.then(|| DIGEST_KEY.to_owned()));
     };
-    let expected: BTreeMap<String, String> =
+    let mut expected: BTreeMap<String, String> =
         serde_json::from_str(expected.get()).unwrap_or_default();
+    // Older files have no digest of all digests.
+    let whole = expected.remove(DIGEST_KEY);
     let is_changed = |key: &&String| found.get(*key) != expected.get(*key);
-    Ok(found.keys().chain(expected.keys()).find(is_changed).cloned())
+    let changed = found.keys().chain(expected.keys()).find(is_changed).cloned();
+    let is_mixed = || whole.is_some_and(|whole| whole != of_all(&expected));
+    Ok(changed.or_else(|| is_mixed().then(|| DIGEST_KEY.to_owned())))
+}
+
+/// Returns one digest of all values, except that under [`DIGEST_KEY`].
+pub(crate) fn digest_of_values(mut values: Map<String, Value>) -> String {
+    values.remove(DIGEST_KEY);
+    of_all(&digests_of(&values))
 }
 
 /// Returns the digest of each value of a JSON object. White space and the order of keys do not
 /// affect the digests.
 fn digests(text: &str) -> serde_json::Result<BTreeMap<String, String>> {
-    let values: Map<String, Value> = serde_json::from_str(text)?;
-    let short = |value: &Value| {
-        let digest = digest(value.to_string().as_bytes());
-        digest.get(..DIGEST_DIGITS).unwrap_or_default().to_owned()
-    };
-    Ok(values.iter().map(|(key, value)| (key.clone(), short(value))).collect())
+    Ok(digests_of(&serde_json::from_str(text)?))
+}
+
+/// Returns the digest of each value.
+fn digests_of(values: &Map<String, Value>) -> BTreeMap<String, String> {
+    values.iter().map(|(key, value)| (key.clone(), short(&value.to_string()))).collect()
+}
+
+/// Returns one digest of the digests of all keys.
+fn of_all(digests: &BTreeMap<String, String>) -> String {
+    short(&json!(digests).to_string())
+}
+
+/// Returns the digest of a text in [`DIGEST_DIGITS`] digits.
+fn short(text: &str) -> String {
+    digest(text.as_bytes()).get(..DIGEST_DIGITS).unwrap_or_default().to_owned()
 }
 
 #[cfg(test)]
@@ -97,5 +119,12 @@ mod tests {
             let changed = whole.replacen(from, to, 1);
             assert_eq!(changed_key(&changed).unwrap().as_deref(), Some(key), "{changed}");
         }
+        // A value together with its digest, as from another file.
+        let entry = |whole: &str| {
+            whole.lines().find(|line| line.starts_with("    \"a\": ")).unwrap().to_owned()
+        };
+        let other = sealed(&text.replace("1.5e-7", "1.6e-7"));
+        let mixed = whole.replace("1.5e-7", "1.6e-7").replace(&entry(&whole), &entry(&other));
+        assert_eq!(changed_key(&mixed).unwrap().as_deref(), Some(DIGEST_KEY), "{mixed}");
     }
 }

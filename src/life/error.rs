@@ -39,8 +39,8 @@ pub enum PriorError {
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable { file: PathBuf, source: std::io::Error },
     #[error(
-        "{}: changed since flexcal wrote it; run flexcal fleet again, or move the file to another \
-         folder to use it as it is",
+        "{}: changed or cut since flexcal wrote it; run flexcal fleet again, or remove its line \
+         digest and move it to another folder to use it as it is",
         file.display()
     )]
     Changed { file: PathBuf },

@@ -35,7 +35,7 @@ const FALSE_UNLIKE_PROBABILITY: f64 = 0.01;
 /// the arm is compared in this parameter.
 const MIN_LEARNED: f64 = 0.05;
 /// Minimum number of arms of a fleet.
-const MIN_ARMS: usize = 3;
+pub(super) const MIN_ARMS: usize = 3;
 /// Last parts of the names of parameters whose deviation is ln(value / nominal).
 const RELATIVE_FIELDS: [&str; 6] = ["stiffness", "EA", "EI", "EIy", "EIz", "GJ"];
 /// First parts of the names of parameters of the measurement setup, which are no parameters of the

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::error::PriorError;
-use super::fleet::Fleet;
-use crate::files::{read_limited, was_changed};
+use super::fleet::{Fleet, MIN_ARMS};
+use crate::files::{DIGEST_KEY, digest_of_values, read_limited, was_changed};
 use crate::problem::digest::with_whole_names;
 
 /// Value of the key `format`.
@@ -36,6 +36,9 @@ struct Document {
     format: String,
     version: u32,
     problem: String,
+    arms: i64,
+    /// Digest of all other values; absent in older files and in those written by hand.
+    digest: Option<String>,
     arm_parts: BTreeMap<String, String>,
     parameters: BTreeMap<String, Entry>,
 }
@@ -50,14 +53,15 @@ struct Entry {
 impl Fleet {
     /// Returns the text of PRIOR.toml.
     pub fn to_toml(&self) -> String {
-        let mut text = format!(
+        let head = format!(
             "# Mean and spread (1 σ) of the deviations from nominal of {} arms: flexcal identify --prior takes this file.\n\
              # SI units; of the logarithm for stiffnesses and rigidities.\n\
-             format = \"{FORMAT}\"\nversion = {VERSION}\nproblem = {}\narms = {}\n\n[arm_parts]\n",
+             format = \"{FORMAT}\"\nversion = {VERSION}\nproblem = {}\narms = {}\n",
             self.arms.len(),
             quoted(&self.problem),
             self.arms.len()
         );
+        let mut text = "\n[arm_parts]\n".to_owned();
         for (part, digest) in &self.arm_parts {
             let _ = writeln!(text, "{} = {}", quoted(part), quoted(digest));
         }
@@ -72,8 +76,14 @@ impl Fleet {
                 parameter.spread
             );
         }
-        text
+        let digest = digest_of(&format!("{head}{text}")).unwrap_or_default();
+        format!("{head}{DIGEST_KEY} = {}\n{text}", quoted(&digest))
     }
+}
+
+/// Returns one digest of all values of a PRIOR.toml except the digest in it.
+fn digest_of(text: &str) -> Result<String, toml::de::Error> {
+    toml::from_str(text).map(digest_of_values)
 }
 
 /// Returns a text as a TOML string.
@@ -95,18 +105,23 @@ impl FleetPrior {
         if text.lines().any(|line| line.trim() == "[[joint]]") {
             return Err(syntax("it declares joints, as a problem.toml does".to_owned()));
         }
-        let Document { format, version, problem, arm_parts, parameters } =
-            toml::from_str(&text).map_err(|error| syntax(error.message().to_owned()))?;
+        let unread = |error: toml::de::Error| syntax(error.message().to_owned());
+        let Document { format, version, problem, arms, digest, arm_parts, parameters } =
+            toml::from_str(&text).map_err(unread)?;
         if format != FORMAT || version > VERSION {
             return Err(syntax(format!("format {format}, version {version}")));
         }
-        if was_changed(file) {
+        let found = digest_of(&text).map_err(unread)?;
+        if was_changed(file) || digest.is_some_and(|digest| digest != found) {
             return Err(PriorError::Changed { file: file.to_owned() });
+        }
+        if !usize::try_from(arms).is_ok_and(|arms| arms >= MIN_ARMS) {
+            return Err(syntax(format!("arms = {arms}, but a fleet has at least {MIN_ARMS}")));
         }
         if let Some((name, _)) = parameters.iter().find(|(_, entry)| !entry.is_usable()) {
             return Err(syntax(format!(
-                "{name}: mean, mean_error and spread are numbers below {MAX_MAGNITUDE:e}, and the latter \
-                 two are 0 or more and not both 0"
+                "{name}: mean, mean_error and spread are numbers below {MAX_MAGNITUDE:e}, mean_error is \
+                 0 or more, and spread is above 0"
             )));
         }
         let entry = |(name, entry): (String, Entry)| (name, (entry.mean, entry.sigma()));
@@ -121,11 +136,12 @@ impl FleetPrior {
 const MAX_MAGNITUDE: f64 = 1e9;
 
 impl Entry {
-    /// Returns true if the numbers are finite and give a positive 1 σ.
+    /// Returns true if the numbers are finite and the spread, which no fleet finds to be 0, is
+    /// positive.
     fn is_usable(&self) -> bool {
         self.mean.abs() < MAX_MAGNITUDE
             && [self.mean_error, self.spread].iter().all(|size| (0.0..MAX_MAGNITUDE).contains(size))
-            && self.sigma() > 0.0
+            && self.spread > 0.0
     }
 
     /// Returns 1 σ of the deviation of the next arm: spread and error of the mean together.
