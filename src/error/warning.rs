@@ -64,6 +64,13 @@ pub enum WarningKind {
         tolerance: Option<String>,
         alike: Option<(usize, [String; 2])>,
     },
+    #[error(
+        "no column states from which side joints come to a pose, so the motions of this joint table \
+         do: at {stops} unmeasured stop{} between measured poses joints turn; columns approach1 … \
+         would replace these directions",
+        plural(*stops)
+    )]
+    ApproachesTaken { stops: usize },
     #[error("changed since flexcal wrote it; used all the same")]
     FileChanged,
     #[error("not UTF-8 text; read as Windows-1252 (Latin-1), so check accented letters and signs")]

@@ -169,6 +169,11 @@ impl Table {
         }
     }
 
+    /// Returns true if the text of a cell is a date and time.
+    pub fn is_instant(&self, cell: &str) -> bool {
+        date_time(cell, self.date_order).is_some()
+    }
+
     /// Returns true if a cell of the current row is a date and time.
     pub fn is_date(&self, place: usize) -> bool {
         self.instant(place).is_ok_and(|word| date_time(&word, self.date_order(place)).is_some())

@@ -13,6 +13,9 @@ pub(super) struct LogRow {
     pub time: f64,
     /// Number of measured rows whose partner this row is.
     pub uses: usize,
+    /// Configuration, shape = (joints) \[rad\] or \[m\]; empty before it is read, and if a
+    /// coordinate is missing.
+    pub configuration: Vec<f64>,
 }
 
 impl LogRow {

@@ -1,10 +1,17 @@
 //! Builders of word columns.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 use super::Labels;
-use crate::error::one_line;
+use super::columns::{Column, Columns};
+use super::latin::parsed;
+use super::role::Role;
+use super::table::Table;
+use crate::error::{Warning, WarningKind, one_line};
+
+/// Smallest number of rows whose different words in a column are names of poses.
+const MIN_LABELLED_ROWS: usize = 2;
 
 /// Collector of one word per row, which stores each distinct word once.
 #[derive(Default)]
@@ -33,6 +40,42 @@ impl<W: AsRef<str>> FromIterator<W> for Labels {
         let mut builder = LabelsBuilder::default();
         words.into_iter().for_each(|word| builder.push(word.as_ref()));
         builder.labels
+    }
+}
+
+impl Columns {
+    /// Takes the first unread column with a different word in each row as the names of planned poses,
+    /// unless a column has them, and drops the warning that it is ignored.
+    pub fn take_labels(&mut self, table: &Table, ignored: &mut Vec<Warning>) {
+        let rows = table.beginning.rows();
+        let is_label = |place: &usize| {
+            let cells = || rows.iter().filter_map(|row| row.get(*place));
+            let is_word =
+                |cell: &String| parsed(cell).is_none() && cell.chars().any(char::is_alphabetic);
+            let is_read = self.read.iter().any(|column| column.place == *place);
+            let different: HashSet<&String> = cells().collect();
+            !is_read
+                && self.marked != Some(*place)
+                && !table.is_read_as_date(*place)
+                && different.len() == rows.len()
+                && cells().all(|cell| is_word(cell) && !table.is_instant(cell))
+        };
+        if self.has(Role::Pose) || rows.len() < MIN_LABELLED_ROWS {
+            return;
+        }
+        let Some(place) = (0..table.header.len()).find(is_label) else { return };
+        let name = table.name_of(place);
+        let location = table.column(name);
+        ignored.retain_mut(|warning| match &mut warning.kind {
+            WarningKind::ColumnIgnored { .. } => warning.location != location,
+            WarningKind::Unmapped { names } => {
+                names.retain(|other| other != name);
+                !names.is_empty()
+            }
+            _ => true,
+        });
+        self.read.push(Column { role: Role::Pose, place, to_si: std::convert::identity });
+        self.read.sort_by_key(|column| column.role);
     }
 }
 

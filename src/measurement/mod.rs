@@ -15,6 +15,8 @@ mod clocks;
 mod column_table;
 #[deny(clippy::indexing_slicing)]
 mod columns;
+#[deny(clippy::indexing_slicing)]
+mod concatenated;
 mod cut_end;
 mod dataset;
 #[deny(clippy::indexing_slicing)]
@@ -82,7 +84,7 @@ pub use builder::{DatasetBuilder, DatasetError};
 pub use column_table::{ColumnTable, ColumnValues};
 pub use dataset::Dataset;
 pub(crate) use dataset::MAX_FITTED_BASES;
-pub(crate) use order::RowOrder;
+pub(crate) use order::{RowOrder, Stop};
 pub(crate) use repeats::count_distinct;
 pub use split::Split;
 pub(crate) use start_times::StartTimes;
@@ -103,6 +105,9 @@ pub struct Measurements {
     /// Measurements of fixed points between the poses; they take no part in fits.
     #[doc(hidden)]
     pub nests: Vec<NestReading>,
+    /// Unmeasured poses of the joint table by which the arm came to rows, in the order of these.
+    #[doc(hidden)]
+    pub stops: Vec<Stop>,
     /// Observation of each row; empty if all rows measure positions.
     #[doc(hidden)]
     pub observations: Vec<Observation>,
@@ -419,6 +424,7 @@ impl Measurements {
             configurations: each(&self.configurations),
             other_configurations: self.other_configurations.as_deref().map(each),
             nests: self.nests.clone(),
+            stops: self.stops_before(rows),
             observations: match &self.observations[..] {
                 [] => Vec::new(),
                 observations => rows.iter().map(|&row| observations[row]).collect(),
@@ -452,45 +458,6 @@ impl Measurements {
             warnings: self.warnings.clone(),
             order: RowOrder::default(),
         }
-    }
-
-    /// Returns these rows followed by those of a table with the same columns, sessions and targets.
-    #[must_use]
-    pub(crate) fn concatenate(&self, other: &Self) -> Self {
-        fn both<T: Clone>([first, second]: [&Option<Vec<T>>; 2]) -> Option<Vec<T>> {
-            Some([first.as_deref()?, second.as_deref()?].concat())
-        }
-        let mut joined = self.clone();
-        joined.origin.extend(&other.origin);
-        joined.configurations.extend(&other.configurations);
-        joined.other_configurations =
-            both([&self.other_configurations, &other.other_configurations]);
-        if !self.observations.is_empty() || !other.observations.is_empty() {
-            let each = |table: &Self| {
-                (0..table.len()).map(|row| table.observation(row)).collect::<Vec<_>>()
-            };
-            joined.observations = [each(self), each(other)].concat();
-        }
-        joined.positions.extend(&other.positions);
-        joined.orientations = both([&self.orientations, &other.orientations]);
-        joined.sigma = both([&self.sigma, &other.sigma]);
-        joined.payload = both([&self.payload, &other.payload]);
-        joined.hoist = both([&self.hoist, &other.hoist]);
-        joined.temperature = both([&self.temperature, &other.temperature]);
-        joined.time.extend(&other.time);
-        joined.approach = both([&self.approach, &other.approach]);
-        joined.velocities = both([&self.velocities, &other.velocities]);
-        joined.covariates.extend(&other.covariates);
-        joined.pose = both([&self.pose, &other.pose]);
-        joined.session.of_row.extend(&other.session.of_row);
-        if let (Some(target), Some(other)) = (&mut joined.target, &other.target) {
-            target.of_row.extend(&other.of_row);
-        }
-        if let (Some(marked), Some(other)) = (&mut joined.marked_held_out, &other.marked_held_out) {
-            marked.extend(other);
-        }
-        joined.nests.extend(other.nests.iter().cloned());
-        joined
     }
 }
 

@@ -28,12 +28,31 @@ impl PartialEq for RowOrder {
     }
 }
 
+/// Unmeasured pose of the joint table, by which the arm came to a measured one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stop {
+    /// First row that was measured afterwards.
+    pub(super) before: usize,
+    /// Time \[s\]; NaN if it is unknown.
+    pub(super) time: f64,
+    /// Configuration, shape = (joints) \[rad\] or \[m\].
+    pub(super) configuration: Vec<f64>,
+}
+
+impl Stop {
+    /// Returns the stop in a table that has `rows` further rows before.
+    pub(super) fn moved_by(&self, rows: usize) -> Self {
+        Self { before: self.before + rows, ..self.clone() }
+    }
+}
+
 /// Chronological order of the rows: session by session, and by time within a session.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Chronology {
     /// For each row, the position in the order of the first row of its session, and of itself.
     places: Vec<(u32, u32)>,
-    /// Columns in chronological order; `None` if the table already has that order.
+    /// Columns in chronological order, with the stops between rows; `None` if the table already has
+    /// that order and no stops.
     sorted: Option<Past>,
 }
 
@@ -45,26 +64,58 @@ impl Chronology {
             session(a).cmp(&session(b)).then(table.time[a].total_cmp(&table.time[b]))
         });
         let mut places = vec![(0, 0); rows.len()];
-        let mut begin = 0_u32;
-        for ((&row, &before), at) in rows.iter().zip(rows.first().into_iter().chain(&rows)).zip(0..)
-        {
-            if session(row) != session(before) {
+        let (mut begin, mut at) = (0, 0);
+        let mut past = Past::default();
+        for (&row, &before) in rows.iter().zip(rows.first().into_iter().chain(&rows)) {
+            let is_first = row == before || session(row) != session(before);
+            if is_first {
                 begin = at;
             }
+            for stop in table.stops_of(row) {
+                past.add_stop(stop, table, (row, (!is_first).then_some(before)));
+                at += 1;
+            }
             places[row] = (begin, at);
+            past.add_row(table, row);
+            at += 1;
         }
-        let n = table.joints;
-        let sorted_column = |column: &[f64]| rows.iter().map(|&row| column[row]).collect();
-        let sorted_joints = |column: &[f64]| {
-            rows.iter().flat_map(|&row| &column[row * n..(row + 1) * n]).copied().collect()
-        };
-        let sorted = (!rows.is_sorted()).then(|| Past {
-            times: sorted_column(&table.time),
-            temperatures: table.temperature.as_deref().map(sorted_column).unwrap_or_default(),
-            configurations: sorted_joints(&table.configurations),
-            approaches: table.approach.as_deref().map(sorted_joints).unwrap_or_default(),
-        });
-        Self { places, sorted }
+        let is_in_order = rows.is_sorted() && table.stops.is_empty();
+        Self { places, sorted: (!is_in_order).then_some(past) }
+    }
+}
+
+impl Past {
+    /// Appends a row of a table.
+    fn add_row(&mut self, table: &Measurements, row: usize) {
+        let of_joints = row * table.joints..(row + 1) * table.joints;
+        self.times.push(table.time[row]);
+        self.temperatures.extend(table.temperature.as_ref().map(|column| column[row]));
+        self.configurations.extend(&table.configurations[of_joints.clone()]);
+        self.approaches.extend(table.approach.iter().flat_map(|all| &all[of_joints.clone()]));
+    }
+
+    /// Appends a stop between two rows of a table; the first is `None` at the start of a session. Its
+    /// direction of approach is that of the step to it, and the temperature is linear in time.
+    fn add_stop(
+        &mut self,
+        stop: &Stop,
+        table: &Measurements,
+        (row, before): (usize, Option<usize>),
+    ) {
+        let until = table.time[row];
+        let since = before.map_or(f64::MIN, |before| table.time[before]);
+        let last = self.times.last().copied().filter(|_| before.is_some());
+        let time = stop.time.max(last.unwrap_or(since)).min(until);
+        let time = if stop.time.is_nan() { until } else { time };
+        self.times.push(time);
+        self.configurations.extend(&stop.configuration);
+        self.temperatures.extend(table.temperature.as_ref().map(|column| {
+            let part = before.map_or(1.0, |_| (time - since) / (until - since));
+            let first = column[before.unwrap_or(row)];
+            if part.is_finite() { first + part * (column[row] - first) } else { column[row] }
+        }));
+        let sides = table.approach.iter().flat_map(|_| std::iter::repeat_n(0.0, table.joints));
+        self.approaches.extend(sides);
     }
 }
 
@@ -73,18 +124,20 @@ impl Measurements {
     /// duration of the longest session \[s\]. Returns `None` if times were not measured or no
     /// configuration changes.
     pub(crate) fn clock(&self) -> Option<(f64, f64)> {
-        let chronology = self.chronology();
-        let sorted = chronology.sorted.as_ref();
-        let times = sorted.map_or(self.time.as_slice(), |sorted| &sorted.times);
-        let configurations =
-            sorted.map_or(self.configurations.as_slice(), |sorted| &sorted.configurations);
-        let at_pose = |k: usize| configurations.get(k * self.joints..(k + 1) * self.joints);
+        let places = &self.chronology().places;
+        let mut rows: Vec<usize> = (0..self.len()).collect();
+        rows.sort_by_key(|&row| places[row]);
+        let mut start = *rows.first()?;
         let (mut between, mut longest) = (Vec::new(), 0.0_f64);
-        for &(begin, at) in &chronology.places {
-            let (begin, at) = (begin as usize, at as usize);
-            longest = longest.max(times[at] - times[begin]);
-            let is_next = at > begin && times[at] > times[at - 1] && at_pose(at) != at_pose(at - 1);
-            between.extend(is_next.then(|| times[at] - times[at - 1]));
+        for (&row, &before) in rows.iter().zip(rows.iter().take(1).chain(&rows)) {
+            let is_next = places[row].0 == places[before].0;
+            if !is_next {
+                start = row;
+            }
+            longest = longest.max(self.time[row] - self.time[start]);
+            let step = self.time[row] - self.time[before];
+            let moved = self.configuration(row) != self.configuration(before);
+            between.extend((is_next && step > 0.0 && moved).then_some(step));
         }
         between.sort_by(f64::total_cmp);
         between
@@ -137,7 +190,24 @@ impl Measurements {
         if !had || self.approach.is_some() {
             return Cow::Borrowed(self);
         }
-        Cow::Owned(Self { approach: Some(vec![0.0; self.configurations.len()]), ..self.clone() })
+        let approach = Some(vec![0.0; self.configurations.len()]);
+        // The past stays the same, because an unknown direction reads as none.
+        Cow::Owned(Self { approach, order: RowOrder(self.order.0.clone()), ..self.clone() })
+    }
+
+    /// Returns the stops since the row that was measured before `row`.
+    fn stops_of(&self, row: usize) -> &[Stop] {
+        let first = self.stops.partition_point(|stop| stop.before < row);
+        let next = self.stops.partition_point(|stop| stop.before <= row);
+        &self.stops[first..next]
+    }
+
+    /// Returns the stops before each of some rows, for a table of these rows alone.
+    pub(super) fn stops_before(&self, rows: &[usize]) -> Vec<Stop> {
+        let moved = |(before, &row): (usize, &usize)| {
+            self.stops_of(row).iter().map(move |stop| Stop { before, ..stop.clone() })
+        };
+        rows.iter().enumerate().flat_map(moved).collect()
     }
 
     /// Returns the columns on which the past of a pose depends, in the order of the rows.

@@ -6,14 +6,15 @@ use super::columns::{Column, Columns};
 use super::joined::JoinedLog;
 use super::limits::Commands;
 use super::observed;
-use super::role::{POINT, POSITION, Role};
+use super::role::{POINT, Role};
 use super::rows::RowsBuilder;
 use super::settled::listed_together;
 use super::table::Table;
+use super::unmeasured::is_missing;
 use super::{ColumnTable, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
 use crate::files::{same_file, was_changed};
-use crate::problem::{Dialect, JoinRule, JointLog, Missing, Problem};
+use crate::problem::{Dialect, JoinRule, JointLog, Problem};
 
 impl Measurements {
     /// Reads files one after the other; also returns warnings, for example about ignored columns.
@@ -268,6 +269,9 @@ impl<'a> Tables<'a> {
             Some(declared) => of_exchanged_tables(error, declared, &self.problem.data.dialect),
             None => error,
         })?;
+        if !self.measured && !self.joins {
+            columns.take_labels(&table, &mut ignored);
+        }
         observed::check_target_column(&table, &columns, self.problem)?;
         if !table.next_row()? {
             let line = table.line();
@@ -275,7 +279,8 @@ impl<'a> Tables<'a> {
                 .at_line(line)
                 .error(TableErrorKind::NoRowsBelowHeader));
         }
-        if let Some(log) = &log {
+        if let Some(log) = &mut log {
+            log.read_configurations(&mut table, |row| columns.configuration(row, self.problem));
             log.show_first_row(&mut table);
         }
         columns.decide_time_column(&table, &mut ignored)?;
@@ -318,8 +323,12 @@ impl<'a> Tables<'a> {
                     (rows.file_stem(index), &observations),
                     self.problem,
                 )?;
+                let first = rows.arm_row_count();
                 for observed in &observations {
                     rows.push(index, &table, &columns, observed)?;
+                }
+                if let Some(log) = &mut log {
+                    log.state_measured(first..rows.arm_row_count());
                 }
             }
             if !table.next_row()? {
@@ -354,6 +363,7 @@ impl<'a> Tables<'a> {
                     warnings.extend(log.warnings()?);
                     measurements.files.extend(log.files());
                     measurements.clock_offsets = log.offsets_by_rows();
+                    warnings.extend(log.add_stops(&mut measurements, problem));
                 }
                 measurements.require_moving_views(problem)?;
                 measurements.require_pixels(problem)?;
@@ -446,31 +456,6 @@ fn of_exchanged_tables(error: InputError, declared: &JointLog, dialect: &Dialect
         kind => kind,
     };
     InputError { location, kind: Box::new(kind) }
-}
-
-/// Returns true if the position of the current row is the word or number that marks a missing
-/// measurement.
-fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
-    let axis = |column: &&Column| {
-        let axis = POSITION.iter().position(|role| *role == column.role)?;
-        Some((axis, column.place))
-    };
-    let mut cells = columns.read.iter().filter_map(|column| axis(&column)).peekable();
-    match missing {
-        Missing::Word(word) => {
-            cells.any(|(_, place)| table.text(place).is_ok_and(|cell| cell == word))
-        }
-        Missing::Position(nothing) => {
-            let same = |(axis, place): (usize, usize)| {
-                table.number(place).is_ok_and(|value| {
-                    nothing
-                        .get(axis)
-                        .is_some_and(|marker| marker.to_bits() == (value + 0.0).to_bits())
-                })
-            };
-            cells.peek().is_some() && cells.all(same)
-        }
-    }
 }
 
 /// Returns the columns of joint commands among `columns`, with their names.

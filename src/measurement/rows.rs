@@ -106,6 +106,11 @@ impl RowsBuilder {
         self.measurements.len() + self.measurements.nests.len()
     }
 
+    /// Returns the number of rows of the arm so far.
+    pub fn arm_row_count(&self) -> usize {
+        self.measurements.len()
+    }
+
     /// Returns the name of a file without extension.
     pub fn file_stem(&self, file: usize) -> &str {
         self.stems.get(file).map_or("", String::as_str)

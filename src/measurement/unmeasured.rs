@@ -1,9 +1,12 @@
 //! Errors of rows that contain no measurement: summaries, titles of pages, and missing positions.
 
 use super::cell_words::is_not_available;
+use super::columns::{Column, Columns};
 use super::latin::parsed;
+use super::role::POSITION;
 use super::table::{Table, shortened};
 use crate::error::{InputError, InputErrorKind, TableErrorKind};
+use crate::problem::Missing;
 
 /// Minimum number of empty cells at which a row that begins with a word is probably a summary.
 const MIN_EMPTY_CELLS: usize = 2;
@@ -68,5 +71,30 @@ impl Table {
             }
             _ => error,
         })
+    }
+}
+
+/// Returns true if the position of the current row is the word or number that marks a missing
+/// measurement.
+pub(super) fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
+    let axis = |column: &&Column| {
+        let axis = POSITION.iter().position(|role| *role == column.role)?;
+        Some((axis, column.place))
+    };
+    let mut cells = columns.read.iter().filter_map(|column| axis(&column)).peekable();
+    match missing {
+        Missing::Word(word) => {
+            cells.any(|(_, place)| table.text(place).is_ok_and(|cell| cell == word))
+        }
+        Missing::Position(nothing) => {
+            let same = |(axis, place): (usize, usize)| {
+                table.number(place).is_ok_and(|value| {
+                    nothing
+                        .get(axis)
+                        .is_some_and(|marker| marker.to_bits() == (value + 0.0).to_bits())
+                })
+            };
+            cells.peek().is_some() && cells.all(same)
+        }
     }
 }

@@ -343,6 +343,36 @@ fn the_offset_of_the_clocks_is_named_whatever_the_tolerance() {
 }
 
 #[test]
+fn whole_seconds_and_a_row_logged_twice_leave_the_offset_certain() {
+    let (log, mut measured) = stops();
+    measured.clear();
+    measured.extend(log.iter().step_by(2).map(|time| (time + 3604.2).floor()));
+    let mut twice = log.clone();
+    twice.insert(21, log[20] + 0.004);
+    let text = |times: &[f64]| {
+        let rows = times.iter().map(|time| {
+            let nearest = log.iter().position(|stop| (stop - time).abs() < 0.01).unwrap();
+            format!("{time:.3},{nearest},1\n")
+        });
+        "time_s,q1_deg,q2_deg\n".to_owned() + &rows.collect::<String>()
+    };
+    let tracker = measured.iter().enumerate().map(|(k, time)| format!("{time:.0},{k},1,2\n"));
+    let tracker = "time_s,x_mm,y_mm,z_mm\n".to_owned() + &tracker.collect::<String>();
+    let problem = format!(
+        "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['log.csv'], by = 'time' }}\n"
+    );
+    let folder = Folder::with([
+        ("problem.toml", &*problem),
+        ("tracker.csv", &tracker),
+        ("log.csv", &text(&twice)),
+    ]);
+    let problem = Problem::read(&folder.path("problem.toml")).unwrap();
+    let (rows, warnings) = Measurements::read(&problem.data.files, &problem).unwrap();
+    assert_eq!(rows.len(), 40);
+    assert_contains(&words(&warnings), &["its clock differs", "offset_s = 360"]);
+}
+
+#[test]
 fn a_join_that_loses_most_rows_is_refused_and_one_at_equal_steps_knows_its_shifts() {
     let every = |start: f64| (0..50).map(|k| f64::from(k) * 30.0 + start).collect::<Vec<f64>>();
     let mut measured = every(35.2);

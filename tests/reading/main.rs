@@ -16,3 +16,4 @@ mod joined;
 mod limits;
 mod names;
 mod sheet;
+mod stops;

@@ -57,21 +57,23 @@ const MIN_CLEAR_RATIO: f64 = 2.0;
 const MIN_CLEAR_ROWS: usize = 10;
 
 impl ClockShift {
-    /// Returns true if so many rows measured at `times` \[s\] are so near their partners in `log` that
-    /// the shift may be taken without being declared.
-    pub fn is_clear(self, times: &[f64], log: &[f64]) -> bool {
+    /// Returns true if so many rows measured at `times` \[s\] are so near their partners in `log`, a
+    /// table of the `stops`, that the shift may be taken without being declared.
+    pub fn is_clear(self, times: &[f64], (log, stops): (&[f64], &Stops)) -> bool {
         if self.is_of_stops {
             return true;
         }
         let is_close = median_step(log).is_some_and(|step| self.gap <= MAX_CLEAR_GAP * step);
-        // The row that is next nearest to each must not be its partner as well.
+        // The stop that is next nearest to each must not be its partner as well.
         let is_only = |time: &f64| {
             let time = time - self.seconds;
-            let partner = nearest(log, time).filter(|(_, gap)| *gap <= self.gap);
+            let partner = nearest_rest(&stops.runs, time).filter(|(_, gap)| *gap <= self.gap);
             partner.is_none_or(|(place, _)| {
                 let around = [place.checked_sub(1), Some(place + 1)].into_iter().flatten();
-                let mut others = around.filter_map(|other| log.get(other));
-                others.all(|other| (other - time).abs() > MIN_CLEAR_RATIO * self.gap)
+                let mut others = around.filter_map(|other| stops.runs.get(other));
+                others.all(|other| {
+                    (other.first - time).max(time - other.last) > MIN_CLEAR_RATIO * self.gap
+                })
             })
         };
         is_close && times.len() >= MIN_CLEAR_ROWS && times.iter().all(is_only)
@@ -111,7 +113,10 @@ fn shift_by_stops(times: &[f64], log: &[f64], runs: &[Rest]) -> Option<ClockShif
     let is_logged_on_the_way = several.len() as f64 >= MIN_PAIRED_FRACTION * times.len() as f64;
     let stops = if is_logged_on_the_way { several.as_slice() } else { runs };
     let first: Vec<f64> = stops.iter().map(|stop| stop.first).collect();
-    let arrival = shift_by_rows(times, &first).filter(|shift| shift.is_clear(times, &first))?;
+    let rows = stops.iter().map(|stop| Rest { last: stop.first, ..*stop }).collect();
+    let rows = Stops { runs: rows, rests: Vec::new() };
+    let is_clear = |shift: &ClockShift| shift.is_clear(times, (&first, &rows));
+    let arrival = shift_by_rows(times, &first).filter(is_clear)?;
     let paired: Vec<(f64, Rest)> = times
         .iter()
         .filter_map(|&time| {

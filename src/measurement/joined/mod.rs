@@ -1,5 +1,8 @@
 //! Join of a table of measured positions with a table of joint coordinates.
 
+#[deny(clippy::indexing_slicing)]
+mod on_the_way;
+
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -55,6 +58,10 @@ pub(super) struct JoinedLog {
     stops: Stops,
     /// Column in the current table by which rows are paired; `None` for a join by order.
     key: Option<Key>,
+    /// Partner of the current measured row, by its index.
+    partner: Option<usize>,
+    /// Measured rows of each row that has some, by its index.
+    measured: HashMap<usize, Vec<usize>>,
     /// Number of measured rows for which a partner has been searched.
     requested: usize,
     /// Places of the measured rows without a partner.
@@ -146,7 +153,7 @@ impl JoinedLog {
             }
             let (file, line, cells) = (table.file.clone(), table.line(), table.cells().clone());
             let source = JointRow { file, line, cells };
-            self.rows.push(LogRow { source, time, uses: 0 });
+            self.rows.push(LogRow { source, time, uses: 0, configuration: Vec::new() });
         }
         self.text_warnings.extend(table.text_warnings());
         Ok(())
@@ -195,7 +202,7 @@ impl JoinedLog {
     /// Returns an error if the key cell of the row is empty or invalid, or if several joint rows have
     /// its name.
     pub fn complete(&mut self, table: &mut Table) -> Result<bool, InputError> {
-        let partner = match (self.rule, self.key) {
+        self.partner = match (self.rule, self.key) {
             (JoinRule::Name, Some(key)) => {
                 let name = table.name(key.place)?;
                 if let Some(error) = self.repeated.remove(name) {
@@ -218,7 +225,7 @@ impl JoinedLog {
             _ => Some(self.requested).filter(|&row| row < self.rows.len()),
         };
         self.requested += 1;
-        let Some(row) = partner.and_then(|partner| self.rows.get_mut(partner)) else {
+        let Some(row) = self.partner.and_then(|partner| self.rows.get_mut(partner)) else {
             self.unpaired.push(Location::file(&table.file).at_line(table.line()));
             return Ok(false);
         };
@@ -297,7 +304,7 @@ impl JoinedLog {
         let found = ClockOffset {
             seconds: ((offset + shift.seconds) * 1e3).round() / 1e3,
             tolerance: needs_more.then(|| rounded_up(shift.gap).parse().ok()).flatten(),
-            is_clear: shift.is_clear(&self.times, &self.log_times),
+            is_clear: shift.is_clear(&self.times, (&self.log_times, &self.stops)),
         };
         Some((shift, found))
     }
