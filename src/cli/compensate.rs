@@ -12,7 +12,7 @@ use flexcal::remainder::{self, Compensation, TargetFrame};
 use flexcal::report::{self, Doubts, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
-use super::estimate::Trust;
+use super::estimate::{Trust, older_sides};
 use super::input::Common;
 use super::outcome::Outcome;
 use super::{advice, diagnostic, values};
@@ -100,6 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     );
     let estimate = arguments.trust.read(&arguments.estimate)?;
     let trusted = estimate.trusted;
+    common.hint(older_sides(&estimate, &problem, &targets));
     common.warn_of_loads(&problem, &estimate, &targets);
     if !trusted {
         diagnostic::warn(

@@ -7,6 +7,8 @@ use clap::Args;
 use flexcal::files::{Changes, was_changed};
 use flexcal::fit::{SavedEstimate, SavedEstimateError};
 use flexcal::life::{FleetPrior, PriorError, PriorSource};
+use flexcal::measurement::Measurements;
+use flexcal::problem::Problem;
 
 use super::diagnostic;
 
@@ -56,6 +58,24 @@ impl Trust {
         warn_of_change(&file.display().to_string());
         Ok(())
     }
+}
+
+/// Returns the warning that an estimate of an older version does not say whether its rows had
+/// directions of approach, if `rows` lack them and an effect of the problem is the play of a joint.
+pub fn older_sides(
+    estimate: &SavedEstimate,
+    problem: &Problem,
+    rows: &Measurements,
+) -> Option<String> {
+    let is_older = !estimate.states_approach && rows.approach.is_none();
+    let mut effects = problem.effects.iter().map(|declared| &declared.effect);
+    let play = effects.find(|effect| is_older && effect.is_play())?;
+    Some(format!(
+        "{}: an older version wrote it, which did not state whether its rows had directions of approach; \
+         {} takes the sign of the loads' moment: identify again, or give the rows columns approach1 …",
+        estimate.file.display(),
+        play.name_and_place()
+    ))
 }
 
 /// Error of a table that was changed.

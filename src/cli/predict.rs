@@ -12,7 +12,7 @@ use flexcal::remainder::{self, Bounds, Compared, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
 
-use super::estimate::Trust;
+use super::estimate::{Trust, older_sides};
 use super::input::Common;
 use super::outcome::Outcome;
 use super::{advice, diagnostic, values};
@@ -66,6 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.warn(&warnings);
     let estimate = arguments.estimate.as_deref();
     let estimate = estimate.map(|file| arguments.trust.read(file)).transpose()?;
+    common.hint(estimate.as_ref().and_then(|of| older_sides(of, &problem, &rows)));
     let trusted = estimate.as_ref().is_none_or(|of| of.trusted);
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");

@@ -10,7 +10,7 @@ use flexcal::measurement::Measurements;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, WatchResult};
 
-use super::estimate::Trust;
+use super::estimate::{Trust, older_sides};
 use super::input::Common;
 use super::outcome::Outcome;
 use super::{advice, diagnostic, values};
@@ -89,6 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !estimate.trusted {
         diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
     }
+    common.hint(older_sides(&estimate, &problem, &rows));
     common.warn_of_loads(&problem, &estimate, &rows);
     let is_without_data = common.data().is_empty();
     common.hint(is_without_data.then_some(
@@ -113,6 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let settings = (arguments.drift, arguments.false_alarms);
     let rows = rows.arm_rows();
     let watch = life::watch(&problem, &estimate, &rows, settings)?;
+    common.hint(report::sides_not_stated(&watch.sides, "; the test allows for both"));
     let named = arguments.estimate.display().to_string();
     let json = WatchResult::new(&problem, &named, arguments.drift, &watch).to_json();
     let story = report::watch(&problem, (&watch, estimate.trusted), &rows);

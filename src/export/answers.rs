@@ -32,6 +32,9 @@ pub struct Answers {
     pub targets: Vec<String>,
     /// Input and output numbers of each pose, in the order that the test program reads.
     pub rows: Vec<Vec<f64>>,
+    /// True if the fitted rows had directions of approach, so that those of a pose that states none
+    /// are unknown, and not that of the moment of the loads.
+    pub(super) has_approach: bool,
 }
 
 /// Draws `count` poses within the limits of the joints and predicts them with the identified arm.
@@ -115,7 +118,8 @@ pub fn answers(
         numbers.push(line);
     }
     let Placement { bases, targets, .. } = placement;
-    Ok((Answers { bases, targets, rows: numbers }, model, x))
+    let has_approach = estimate.has_approach;
+    Ok((Answers { bases, targets, rows: numbers, has_approach }, model, x))
 }
 
 /// Returns the nine components of the axes of a frame that is rotated by the rotation vector `turn`

@@ -89,6 +89,7 @@ pub fn sources(
     let mut text =
         format!("{about}#include \"flexcal_model.h\"\n\n{}", include_str!("c/prelude.c"));
     push_structure(&mut text, problem, &parts, tables.is_some());
+    let _ = writeln!(text, "#define HAS_APPROACH {}", u8::from(answers.has_approach));
     push_numbers(&mut text, &numbers);
     text.push_str(&changes.unwrap_or_default());
     text.push_str(include_str!("c/frames.c"));

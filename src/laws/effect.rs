@@ -1,6 +1,6 @@
 //! Properties of effects that follow from the data of their laws.
 
-use std::f64::consts::TAU;
+use std::{collections::BTreeSet, f64::consts::TAU};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -200,7 +200,14 @@ impl Effect {
 
     /// Returns true if the effect depends on directions of approach.
     pub(crate) fn has_sides(&self) -> bool {
-        self.is_play() || self.depends_on(Quantity::has_sides)
+        !self.sided_joints().is_empty()
+    }
+
+    /// Returns the joints, counted from 0, on whose directions of approach the effect depends.
+    pub(crate) fn sided_joints(&self) -> BTreeSet<usize> {
+        let played = self.joint().filter(|_| self.is_play()).and_then(|joint| joint.checked_sub(1));
+        let of_formulas = self.quantities().into_iter().filter_map(Quantity::sided_joint);
+        played.into_iter().chain(of_formulas).collect()
     }
 
     /// Returns true if the effect is the play of a joint, which the moment of the loads takes up

@@ -52,10 +52,13 @@ impl Quantity {
         matches!(self, Self::Warming | Self::Lagging { .. })
     }
 
-    /// Returns true if the value depends on the direction from which a joint approached its
-    /// command.
-    pub fn has_sides(self) -> bool {
-        matches!(self, Self::Approach(_) | Self::Friction { .. })
+    /// Returns the joint, counted from 0, on whose direction of approach the value depends; `None`
+    /// if there is none.
+    pub fn sided_joint(self) -> Option<usize> {
+        match self {
+            Self::Approach(joint) | Self::Friction { joint, .. } => Some(joint),
+            _ => None,
+        }
     }
 
     /// Returns true if the value depends on the time or the order of the poses.

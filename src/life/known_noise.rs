@@ -1,9 +1,13 @@
 //! Noise of new rows, and the misfit that an earlier fit found beyond it.
 
+use nalgebra::DVector;
+
 use super::earlier::EQUAL_SIGMA;
 use crate::fit::SavedEstimate;
-use crate::model::Pose;
+use crate::least_squares::residual_vector;
+use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::Problem;
+use crate::remainder::side_changes;
 
 /// Number of standard errors by which the variance of prediction errors must exceed the declared
 /// noise variance to count as misfit.
@@ -50,9 +54,34 @@ impl KnownNoise {
         Self { sigma, misfit, other_misfit }
     }
 
+    /// Returns the misfit of [`misfit_of`](Self::misfit_of) with what unknown directions of approach
+    /// change at the full parameter vector `x` of a model.
+    pub fn misfit_with_sides(
+        &self,
+        (problem, model, x): (&Problem, &Model, &DVector<f64>),
+        poses: &[Pose],
+    ) -> Option<Vec<Vec<f64>>> {
+        let whitened = |poses: &[Pose], x: &[f64]| {
+            let x = DVector::from_column_slice(x);
+            let residuals = PoseResiduals::new(model, poses.to_vec(), Vec::new(), x);
+            residual_vector(&residuals, &DVector::zeros(0)).as_slice().to_vec()
+        };
+        let mut misfit = self.misfit_of(poses);
+        for change in side_changes((problem, model), x.as_slice(), poses, whitened) {
+            let none = || poses.iter().map(|pose| vec![0.0; pose.coordinates()]).collect();
+            let stride = (change.changes.len() / poses.len().max(1)).max(1);
+            let of_rows = misfit.get_or_insert_with(none).iter_mut();
+            for (sigmas, changes) in of_rows.zip(change.changes.chunks_exact(stride)) {
+                let of_row = sigmas.iter_mut().zip(changes);
+                of_row.for_each(|(sigma, change)| *sigma = sigma.hypot(*change));
+            }
+        }
+        misfit
+    }
+
     /// Returns 1 σ of the misfit of each coordinate of each pose in units of its noise; `None`
     /// without a misfit.
-    pub fn misfit_of(&self, poses: &[Pose]) -> Option<Vec<Vec<f64>>> {
+    fn misfit_of(&self, poses: &[Pose]) -> Option<Vec<Vec<f64>>> {
         if self.misfit == 0.0 && self.other_misfit == 0.0 {
             return None;
         }

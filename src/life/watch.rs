@@ -23,6 +23,7 @@ use crate::model::{Model, Pose};
 use crate::observation::kind_named;
 use crate::problem::{JointKind, Problem};
 use crate::quantity::Unit;
+use crate::remainder::{Uncorrected, unknown_sides};
 use crate::spatial::Frame;
 
 /// Maximum number of causes that are reported.
@@ -85,6 +86,8 @@ pub struct Watch {
     pub sigma: f64,
     /// Causes of a change, the most probable first.
     pub causes: Vec<WatchedCause>,
+    /// Effects of unknown directions of approach; the test allows for both sides.
+    pub(crate) sides: Vec<Uncorrected>,
 }
 
 impl Watch {
@@ -155,12 +158,12 @@ pub fn watch(
     if new.is_empty() {
         return Err(PriorError::NothingNew { file: estimate.file.clone(), rows: left_out });
     }
-    let kept =
-        if left_out > 0 { measurements.select_with_past(&new) } else { measurements.clone() };
-    let placement = Placement::of(&kept);
+    let kept = measurements.select_with_past(&new);
+    let kept = &*kept.with_sides(estimate.has_approach);
+    let placement = Placement::of(kept);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let earlier = Earlier::of_estimate(estimate, problem, &model, days)?;
-    let predicted = fit::predict(problem, Some(estimate), &kept, None)?;
+    let predicted = fit::predict(problem, Some(estimate), kept, None)?;
     if let [first, others @ ..] = predicted.lost_rows().as_slice() {
         let kind = TableErrorKind::LoadsTooLarge { others: others.len() };
         return Err(kept.location(*first).error(kind).into());
@@ -169,17 +172,18 @@ pub fn watch(
     let every_row: Vec<usize> = (0..kept.len()).collect();
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
     let known = KnownNoise::of(problem, estimate);
-    if known.sigma.is_none() && !kept.has_sigma_in_every_row() && has_positions(&kept) {
+    if known.sigma.is_none() && !kept.has_sigma_in_every_row() && has_positions(kept) {
         return Err(PriorError::NoSigma { file: estimate.file.clone() });
     }
     let sigma = known.sigma.unwrap_or(f64::NAN);
-    let mut poses = placement.oriented_poses(&kept, &every_row, (sigma, turn));
+    let mut poses = placement.oriented_poses(kept, &every_row, (sigma, turn));
     estimate.count_time_in(&placement, &mut poses);
-    let misfit = known.misfit_of(&poses);
+    let sides = unknown_sides((problem, &model), x.as_slice(), &poses);
+    let misfit = known.misfit_with_sides((problem, &model, &x), &poses);
     let leading = kept.leading();
     let leads: Vec<bool> =
         every_row.iter().map(|&row| kept.observation(row).kind() == leading.kind()).collect();
-    let tested = TestedRows { problem, model: &model, placement: &placement, kept: &kept, misfit };
+    let tested = TestedRows { problem, model: &model, placement: &placement, kept, misfit };
     let not_finite = || PriorError::NotFinite { file: estimate.file.clone() };
     let mut at_estimate = tested.linearised(&poses, &x, &earlier);
     let mut assessed = assess(&at_estimate.rows, &at_estimate.factor, &at_estimate.causes, true)
@@ -227,7 +231,7 @@ pub fn watch(
         let moved = tested.moved_fixture(at, (&earlier, &leads), threshold, linear);
         let base = || tested.moved_base(at, (&earlier, &leads), threshold, linear);
         let moved = moved.or_else(|| base().filter(|_| is_unexplained));
-        let misread = fit::misread_table(problem, (&model, &x), &kept);
+        let misread = fit::misread_table(problem, (&model, &x), kept);
         watched = WatchedCause::or_misread(moved.unwrap_or(watched), misread);
     }
     state_turns(&model, &x, &mut watched);
@@ -250,6 +254,7 @@ pub fn watch(
             .position(|leads| *leads)
             .map_or(f64::NAN, |first| at_estimate.rows.total_sigma(first)),
         causes: watched,
+        sides,
     })
 }
 

@@ -48,6 +48,7 @@ pub use fit::{Fitted, fit};
 pub(crate) use joint_errors::{JointError, JointErrorPoint};
 pub(crate) use residuals::residuals;
 pub(crate) use saved::{FORMAT, SavedRemainder};
+pub(crate) use uncorrected::{side_changes, unknown_sides};
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{

@@ -87,54 +87,89 @@ pub(super) fn uncorrected(
 ///
 /// A pose with earlier poses states the way that friction depends on. Without a column of
 /// directions, the moment of the loads stands for the direction at the play of a joint.
-pub(super) fn unknown_sides(
+pub(crate) fn unknown_sides(
     (problem, model): (&Problem, &Model),
     x: &[f64],
     poses: &[Pose],
 ) -> Vec<Uncorrected> {
-    let sided = || problem.effects.iter().map(|of| &of.effect).filter(|of| of.has_sides());
-    let names = |of: &Effect| of.parameters(problem).into_iter().map(|parameter| parameter.name);
-    let of_joint = |effect: &Effect, joint: usize| {
-        let reads = |pose: &Pose| match pose.setup.approach.and_then(|sides| sides.get(joint)) {
+    let positions = |poses: &[Pose], x: &[f64]| {
+        let positions = model.predicted_targets(poses, x);
+        positions.iter().flat_map(|position| position.iter().copied()).collect()
+    };
+    let found = side_changes((problem, model), x, poses, positions);
+    let shown = found.into_iter().map(|SideChange { effect, joint, changes }| {
+        let differences = changes.chunks_exact(3).map(Vector3::from_column_slice).collect();
+        Uncorrected { effect: effect.clone(), differences, side: Some(joint), is_bounded: true }
+    });
+    shown.filter(|of| of.sizes().1 > MAX_ROUNDING).collect()
+}
+
+/// Change of numbers by an effect from an unknown direction of approach to a known one.
+pub(crate) struct SideChange<'a> {
+    effect: &'a Effect,
+    joint: usize,
+    /// Change of each number; 0 in poses whose direction is known.
+    pub changes: Vec<f64>,
+}
+
+/// Returns, for each effect of `problem` and each joint on whose direction of approach it depends,
+/// what that direction changes in the numbers of `poses` that `evaluate` returns, as many for each
+/// pose, at the full parameter vector `x` of `model`. Only poses that do not state it are changed.
+pub(crate) fn side_changes<'a>(
+    (problem, model): (&'a Problem, &Model),
+    x: &[f64],
+    poses: &[Pose],
+    evaluate: impl Fn(&[Pose], &[f64]) -> Vec<f64>,
+) -> Vec<SideChange<'a>> {
+    let effects = problem.effects.iter().map(|of| &of.effect);
+    let each = |effect: &'a Effect| effect.sided_joints().into_iter().map(move |at| (effect, at));
+    let sided: Vec<(&Effect, usize)> = effects.flat_map(each).collect();
+    if sided.is_empty() {
+        return Vec::new();
+    }
+    let joints = model.joints();
+    let stated = |pose: &Pose| pose.setup.approach.map_or(vec![0.0; joints], <[f64]>::to_vec);
+    let stated: Vec<Vec<f64>> = poses.iter().map(stated).collect();
+    let with = |sides: &[Vec<f64>], x: &[f64]| {
+        let poses = poses.iter().zip(sides).map(|(pose, sides)| Pose {
+            setup: PoseView { approach: Some(sides), ..pose.setup },
+            ..*pose
+        });
+        evaluate(&poses.collect::<Vec<Pose>>(), x)
+    };
+    let mut middle: Option<Vec<f64>> = None;
+    let mut found = Vec::new();
+    for &(effect, joint) in &sided {
+        let reads = |pose: &Pose| match pose.setup.approach {
             _ if effect.is_friction_alone() => pose.setup.past.read().times.is_empty(),
-            side => side.is_some() || !effect.is_play(),
+            sides => sides.is_some() || !effect.is_play(),
         };
-        let is_unknown = |pose: &Pose| {
-            let side = pose.setup.approach.and_then(|sides| sides.get(joint));
-            side.is_none_or(|side| side.total_cmp(&0.0).is_eq()) && reads(pose)
-        };
-        let mut chosen: Vec<usize> = (0..poses.len()).collect();
-        chosen.retain(|&row| poses.get(row).is_some_and(is_unknown));
-        let others: Vec<String> =
-            sided().filter(|other| !other.is_same_as(effect)).flat_map(names).collect();
-        let parameters = model.parameters.iter().zip(x);
-        let alone = parameters
-            .map(|(parameter, x)| if others.contains(&parameter.name) { 0.0 } else { *x });
-        let alone: Vec<f64> = alone.collect();
-        let at = |side: f64| {
-            let sides: Vec<f64> =
-                (0..model.joints()).map(|other| if other == joint { side } else { 0.0 }).collect();
-            let of_rows = chosen.iter().filter_map(|&row| poses.get(row)).map(|pose| Pose {
-                setup: PoseView { approach: Some(&sides), ..pose.setup },
-                ..*pose
-            });
-            model.predicted_targets(&of_rows.collect::<Vec<Pose>>(), &alone)
-        };
-        let mut differences = vec![Vector3::zeros(); poses.len()];
-        for (&row, (more, less)) in chosen.iter().zip(at(1.0).into_iter().zip(at(-1.0))) {
-            let half = (more - less) * 0.5;
-            if let Some(difference) = differences.get_mut(row)
-                && half.iter().all(|x| x.is_finite())
-            {
-                *difference = half;
+        let (mut sides, mut is_any) = (stated.clone(), false);
+        for (pose, sides) in poses.iter().zip(&mut sides) {
+            if let Some(side) = sides.get_mut(joint).filter(|side| **side == 0.0 && reads(pose)) {
+                (*side, is_any) = (1.0, true);
             }
         }
-        let acts = differences.iter().any(|half| half.norm() > MAX_ROUNDING);
-        let effect = effect.clone();
-        acts.then_some(Uncorrected { effect, differences, side: Some(joint), is_bounded: true })
-    };
-    let each = |effect| (0..model.joints()).map(move |joint| (effect, joint));
-    sided().flat_map(each).filter_map(|(effect, joint)| of_joint(effect, joint)).collect()
+        if !is_any {
+            continue;
+        }
+        // Effects of the same joint are told apart by one evaluation more for each of them.
+        let others = || sided.iter().filter(|of| of.1 == joint && !of.0.is_same_as(effect));
+        let names = others().flat_map(|of| of.0.parameters(problem)).map(|of| of.name);
+        let names: Vec<String> = names.collect();
+        let alone: Vec<f64> = (model.parameters.iter().zip(x))
+            .map(|(parameter, x)| if names.contains(&parameter.name) { 0.0 } else { *x })
+            .collect();
+        let before = match others().next() {
+            Some(_) => &with(&stated, &alone),
+            None => &*middle.get_or_insert_with(|| with(&stated, x)),
+        };
+        let change = |(after, before): (f64, &f64)| Some(after - before).filter(|x| x.is_finite());
+        let changes = with(&sides, &alone).into_iter().zip(before).map(change);
+        let changes = changes.map(Option::unwrap_or_default).collect();
+        found.push(SideChange { effect, joint, changes });
+    }
+    found
 }
 
 /// Adds the effects of unknown directions of approach to the uncertainty of each pose.

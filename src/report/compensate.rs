@@ -100,6 +100,11 @@ pub fn uncorrected_commands(found: &Compensation, is_undecided: bool) -> Vec<Str
 /// Returns a warning that names the directions of approach that rows do not state although effects
 /// depend on them, and the size of these effects; `None` if there are none.
 pub fn unknown_sides(uncorrected: &[Uncorrected], has_bounds: bool) -> Option<String> {
+    sides_not_stated(uncorrected, if has_bounds { "; the bound covers both" } else { "" })
+}
+
+/// Returns the warning of [`unknown_sides`], followed by `covered`.
+pub(crate) fn sides_not_stated(uncorrected: &[Uncorrected], covered: &str) -> Option<String> {
     let (mut columns, mut effects) = (Vec::new(), Vec::new());
     for of in uncorrected {
         let Some(joint) = of.side else { continue };
@@ -116,7 +121,6 @@ pub fn unknown_sides(uncorrected: &[Uncorrected], has_bounds: bool) -> Option<St
     }
     let [column, depends] =
         if columns.len() == 1 { ["column", "depends"] } else { ["columns", "depend"] };
-    let covered = if has_bounds { "; the bound covers both" } else { "" };
     Some(format!(
         "rows do not state from which side joints come: {} {depends} on that, and the middle is \
          taken; add the {column} {}, 1 or -1, the direction of the last motion{covered}",

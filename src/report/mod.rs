@@ -47,6 +47,7 @@ pub(crate) use acceptance::{acceptance_page, acceptance_text, tolerance_text};
 pub(crate) use brief::{determines_nothing, estimate_brief};
 pub(crate) use check::check_brief;
 pub use closed_loop::{loop_report, loop_text};
+pub(crate) use compensate::sides_not_stated;
 pub(crate) use difference::{HeldOutRow, Side, difference, predicts_better};
 pub(crate) use export::set_up_at;
 pub(crate) use fleet::fleet;

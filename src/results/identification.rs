@@ -61,7 +61,6 @@ pub struct IdentificationResult {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub session_times_s: BTreeMap<String, f64>,
     /// True if the rows have directions of approach.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub has_approach: bool,
     /// Standard deviation (1 σ) of a coordinate, estimated from the residuals of this or of the
     /// earlier fit. Null if the problem declares σ, or without degrees of freedom.

@@ -164,10 +164,42 @@ fn targets_without_directions_of_approach_have_wider_bounds() {
         let predict = "predict . --estimate out/estimate.json --data targets.csv --out p";
         let predicted = folder.flexcal(predict).success();
         if has_sides {
+            // A test for changes takes the unknown sides for no change.
+            let watch = "watch . --estimate out/estimate.json --data targets.csv --out w";
+            let watched = folder.flexcal(watch).success();
+            assert_contains(&watched.stderr, &["approach3", "the test allows for both"]);
+            let code = "export . --estimate out/estimate.json --format c --out code --force";
+            folder.flexcal(code).success();
+            let model = folder.read("code/flexcal_model.c");
+            assert_contains(&model, &["#define HAS_APPROACH 1", "has_approach = HAS_APPROACH;"]);
             assert_contains(&predicted.stderr, &said);
             let bounds = folder.table("p/predictions.csv").numbers("bound95_mm");
             assert!(mean(&bounds) > mean(&narrow) + 0.9 * half, "{effect}: {bounds:?}");
         }
+    }
+}
+
+#[test]
+fn estimates_that_do_not_state_directions_of_approach_are_named() {
+    let truth = "[[effect]]\nbacklash = { joint = 3 }\nwidth_deg = 0.1";
+    let [arm, truth] = with_effect("backlash = { joint = 3 }", truth);
+    let truth = truth.replace("[poses]", "[poses]\napproach = false");
+    let arm =
+        arm.replace("a_m = 0.6\n", "a_m = 0.6\nbody = [{ mass_kg = 5, com_m = [0.2, 0, 0] }]\n");
+    let folder = Folder::with([("problem.toml", arm.as_str()), ("truth.toml", truth.as_str())]);
+    folder.simulate(".", "truth.toml", 40, 1, "rows.csv");
+    folder.flexcal("identify . --out out");
+    for command in ["compensate", "predict", "watch"] {
+        let run = format!("{command} . --estimate out/estimate.json --data rows.csv --trust");
+        let said =
+            |out: &str| folder.flexcal(&format!("{run} --out {command}{out} --force")).stderr;
+        let stated = said("1");
+        assert!(!stated.contains("an older version"), "{command}: {stated}");
+        folder.edit("out/estimate.json", "\"has_approach\": false,", "");
+        let older = said("2");
+        assert_eq!(older.matches("an older version").count(), 1, "{command}: {older}");
+        assert_contains(&older, &["backlash 3", "identify again"]);
+        folder.map("out/estimate.json", |text| text.replacen('{', "{\"has_approach\": false,", 1));
     }
 }
 

@@ -56,7 +56,7 @@ void flexcal_default_pose(flexcal_pose *pose)
     pose->payload_kg = PAYLOAD;
     pose->hoist_N = HOIST_FORCE;
     pose->has_hoist = 0;
-    pose->has_approach = 0;
+    pose->has_approach = HAS_APPROACH;
     pose->temperature_C = REFERENCE;
     pose->elapsed_s = R(0.0);
     pose->time_s = R(0.0);

@@ -58,6 +58,8 @@ pub struct SavedEstimate {
     pub start_times: Option<StartTimes>,
     /// True if the fitted rows had directions of approach; false in files of older versions.
     pub(crate) has_approach: bool,
+    /// False in files of older versions, which do not say whether rows had directions of approach.
+    pub(crate) states_approach: bool,
     /// Name of the `remainder.json` in the same folder; `None` if no remainder was accepted.
     pub remainder: Option<String>,
     /// Text of the remainder, if it is in no file.
@@ -242,6 +244,7 @@ impl SavedEstimate {
             start_times: first_time_s
                 .map(|first| StartTimes { first, sessions: session_times_s.unwrap_or_default() }),
             has_approach: has_approach.unwrap_or(false),
+            states_approach: has_approach.is_some(),
             remainder: remainder.and_then(|result| result.file),
             remainder_text: None,
             measurement_files: measurement_files.unwrap_or_default(),
