@@ -348,7 +348,12 @@ fn check_tool(problem: &Problem, model: &Model) -> Result<(), code::ExportError>
         return Err(code::ExportError::SeveralTools);
     }
     let is_turned = problem.tool.rotation.norm() > 0.0 || names.any(|name| name == "tool.rx");
-    if is_turned { Ok(()) } else { Err(code::ExportError::ToolNotTurned) }
+    let camera = problem.fixtures.iter().find(|fixture| fixture.kind.word() == "camera");
+    match camera {
+        _ if is_turned => Ok(()),
+        Some(camera) => Err(code::ExportError::CameraIsWritten { camera: camera.name.clone() }),
+        None => Err(code::ExportError::ToolNotTurned),
+    }
 }
 
 /// Formats the arm or a camera in the format of the arguments. Adds the table of standard

@@ -14,6 +14,15 @@ pub enum ExportError {
          (orientation_sigma_deg in [data]) nor declared (rotation_deg in [tool])"
     )]
     ToolNotTurned,
+    /// There is no tool, but a camera whose mount is written without the option.
+    #[error(
+        "--tool-link writes the pose of a tool, and what is measured here is camera {camera}, whose \
+         mount the file has without it: leave --tool-link out"
+    )]
+    CameraIsWritten {
+        /// Name of the camera.
+        camera: String,
+    },
     /// Sessions or targets have different tools.
     #[error(
         "--tool-link writes one pose, and the sessions or targets of the estimate have different ones"

@@ -8,7 +8,7 @@ use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::{Story, text};
 use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
-use crate::problem::Problem;
+use crate::problem::{Joint, Problem};
 use crate::quantity::format::{counted, mm};
 
 /// Returns the forecast of the command `check`, with a figure of the error of predictions against
@@ -105,6 +105,13 @@ fn head<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(Block::lines(recommendation(problem, check)));
     blocks.push(Block::lines(prediction_sentences(check)));
+    let is_massless = |joint: &Joint| joint.bodies.is_empty() && joint.beam.is_none();
+    if problem.gravity.norm() > 0.0 && problem.joints.iter().all(is_massless) {
+        blocks.push(Block::lines(
+            "No masses are declared, so what gives way under loads cannot be found; rough mass_kg and com_m of \
+             the links will do.",
+        ));
+    }
     blocks
 }
 

@@ -104,6 +104,10 @@ pub fn sheet_text(problem: &Problem, description: &Description, folder: &Path) -
             is_added("[parameters]"),
             "sigma_deg, _mm     in [parameters]: how far off the sheet may be",
         ),
+        (
+            problem.joints.iter().all(|joint| joint.bodies.is_empty()),
+            "mass_kg, com_m     in body of each row, as the comment shows: to find what gives way under loads",
+        ),
         (is_added("[data]"), "files              your table or tables"),
     ];
     for (_, line) in lines.into_iter().filter(|(is_needed, _)| *is_needed) {

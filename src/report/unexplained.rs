@@ -1,5 +1,6 @@
 //! Sentences of the command `loop` about structure whose law is unknown.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::document::{MIN_PROBABLE, code, percent};
@@ -10,7 +11,7 @@ use crate::problem::{Effect, JointKind, Problem};
 use crate::quantity::format::{number, p_value};
 use crate::residual_tests::Covariate;
 use crate::results::{LoopResult, Structure, Summary, at_place};
-use crate::select::{ClosedLoop, Correction, HELD_FIXED, HypothesisKind, REFUSED};
+use crate::select::{ClosedLoop, Correction, HELD_FIXED, HypothesisKind, REFUSED, Status};
 
 /// Returns the empirical correction of structure without a law; `None` if none was accepted.
 fn correction(closure: &ClosedLoop) -> Option<&Correction> {
@@ -55,6 +56,7 @@ pub(super) fn to_declare(
         ));
     }
     declarations.extend(missing_sigma(&closure.before.fit));
+    declarations.extend(missing_sides(closure));
     let limits = result.structures().filter_map(|left| {
         let probability = left.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
         Some((left.limit.as_deref()?, probability))
@@ -68,6 +70,23 @@ pub(super) fn to_declare(
         )
     }));
     declarations
+}
+
+/// Returns the advice to record directions of approach, if the law of an effect that depends on them is
+/// not sure and the rows lack them; `None` otherwise.
+fn missing_sides(closure: &ClosedLoop) -> Option<String> {
+    let unsure = closure.effects.iter().filter(|found| found.status == Status::Located);
+    let unsure = unsure.filter(|_| !closure.after.has_approach);
+    let joints: BTreeSet<usize> = unsure.flat_map(|found| found.effect.sided_joints()).collect();
+    let columns: Vec<String> =
+        joints.iter().map(|joint| code(&format!("approach{}", joint + 1))).collect();
+    (!columns.is_empty()).then(|| {
+        format!(
+            "Add to the table {} (1, −1, or 0 where it is unknown), the direction in which the joint last moved before the pose: it \
+             tells play from friction. A joint table with every stop of the arm, measured or not, gives it, too.",
+            columns.join(", ")
+        )
+    })
 }
 
 /// Describes the places of all structure whose law is unknown, with their probabilities; each place

@@ -196,6 +196,16 @@ fn the_link_of_a_camera_takes_the_pose_that_other_poses_give() {
 }
 
 #[test]
+fn the_mount_of_a_camera_needs_no_option() {
+    let folder = identified(str::to_owned);
+    folder.write("arm.urdf", ARM);
+    let export = "export . --estimate fit/estimate.json --urdf arm.urdf --out new.urdf";
+    let run = folder.flexcal(&format!("{export} --tool-link camera_optical_frame")).code(2);
+    let said = run.message();
+    assert!(said.contains("leave --tool-link out") || said.contains("chain"), "{said}");
+}
+
+#[test]
 fn a_fit_of_few_images_is_exported_with_a_warning() {
     let folder = identified(str::to_owned);
     let table = folder.read("data.csv");
