@@ -118,21 +118,12 @@ impl Statistics {
         let freedom = freedom - left_out;
         let prices = stage.prices(&end.x, &end.at_bound, &constraints)?;
         let bounded_errors = uncertainty.standard_errors();
-        let hidden = if stage.cache.is_provisional() {
-            Vec::new()
-        } else {
-            hidden_by_limits(
-                stage,
-                end,
-                &triangle,
-                (&closed, &held),
-                (&constraints, &prices),
-                &bounded_errors,
-            )
-        };
-        for valley in hidden.iter().filter(|valley| valley.deviation.is_finite()) {
-            let moved = &valley.direction * valley.deviation;
-            uncertainty.covariance += &moved * moved.transpose();
+        let mut hidden = Vec::new();
+        if !stage.cache.is_provisional() {
+            let active = (&constraints[..], &prices);
+            let found = hidden_by_limits(stage, end, &triangle, active, &bounded_errors);
+            hidden = found.0;
+            uncertainty.covariance += found.1;
         }
         let errors = uncertainty.standard_errors();
         let is_open = |j: usize| {
