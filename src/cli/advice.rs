@@ -161,7 +161,7 @@ pub fn after_fit(
         None if found.has(FindingCode::PriorsDecide)
             || found.has(FindingCode::HeldOutUncertain) =>
         {
-            format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
+            plan_more(&named)
         }
         None if found.has(FindingCode::BoundInUnidentifiedDirection) => format!(
             "flexcal identify {named} -v shows what the limits cost; widen those that may be wrong"
@@ -192,6 +192,11 @@ pub fn after_fit(
         }
         None => to_apply("corrects commands"),
     }
+}
+
+/// Names the command that chooses poses where those measured tell too little.
+fn plan_more(named: &str) -> String {
+    format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
 }
 
 /// States what to do if the fit predicts held-out rows worse than the nominal arm does.
@@ -241,8 +246,8 @@ pub fn after_loop(
     let named = common.problem_arguments();
     let file = common.problem_file().display().to_string();
     let spoilt = after.has(FindingCode::ExcludedRowsFitted).then_some(after);
-    if let Some(look) =
-        report::influential_rows_advice(spoilt.unwrap_or(fit), &common.problem_file())
+    if let Some(spoilt) = spoilt.or_else(|| result.is_misfit_of_rows().then_some(fit))
+        && let Some(look) = report::influential_rows_advice(spoilt, &common.problem_file())
     {
         return look;
     }
@@ -277,6 +282,9 @@ pub fn after_loop(
     }
     if after.has(FindingCode::HeldOutNotBetter) {
         return keep_nominal(&named);
+    }
+    if result.effects.is_empty() && fit.has(FindingCode::PriorsDecide) {
+        return plan_more(&named);
     }
     if result.is_contradicted() {
         if result.effects.is_empty() && !problem.effects.is_empty() {
@@ -338,6 +346,12 @@ pub fn after_loop(
              {plan}"
         );
     }
+    to_identify(result, &named, &closed)
+}
+
+/// Names the command that identifies the problem as it is after a loop, or that ranks candidates for
+/// what is left. `closed` is the path of the problem that the loop wrote.
+fn to_identify(result: &LoopResult, named: &str, closed: &str) -> String {
     match result.verdict {
         Verdict::Unexplained if result.is_probably_explained() => {
             format!("flexcal identify {closed} writes the estimate to apply")

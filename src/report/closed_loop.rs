@@ -154,7 +154,9 @@ fn cautions_on_causes<'a>(
 ) -> Vec<Block<'a>> {
     let declare = to_declare(problem, closure, result).into_iter().map(Block::Note);
     let mut blocks: Vec<Block> = declare.collect();
-    blocks.extend(influential_rows(&closure.before.fit));
+    blocks.extend(
+        result.is_misfit_of_rows().then(|| influential_rows(&closure.before.fit)).flatten(),
+    );
     blocks.extend(cautions(closure, result));
     blocks.extend(set_aside(problem, result));
     blocks

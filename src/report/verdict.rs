@@ -37,7 +37,7 @@ pub(super) fn verdict(
         return end
             + "The residual was not examined to the end: no cause is named, and none is ruled out.";
     }
-    let caution = if result.before.misfit_carried_by.is_some() {
+    let caution = if result.is_misfit_of_rows() {
         "Check the influential rows first: wrong rows hide causes, and a cause that acts in them \
          alone looks like wrong rows. "
     } else {

@@ -296,6 +296,14 @@ impl LoopResult {
             && !self.is_contradicted()
     }
 
+    /// Returns true if a few rows cause most of the misfit of the declared problem, and the effects
+    /// that were added do not explain them together with the other rows.
+    pub(crate) fn is_misfit_of_rows(&self) -> bool {
+        let is_left = self.size_test().is_none_or(|(test, chi2)| test.failed && chi2 > 1.0);
+        let are_explained = !self.effects.is_empty() && self.set_aside.is_empty() && !is_left;
+        self.before.misfit_carried_by.is_some() && !are_explained
+    }
+
     /// Returns the test of the size of the residual against the declared σ, with its χ²/ν; `None`
     /// if the test could not be made.
     fn size_test(&self) -> Option<(&ResidualTest, f64)> {

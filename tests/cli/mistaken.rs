@@ -1,4 +1,4 @@
-//! Mistakes in the tables of `compensate` and `next` are named.
+//! Mistakes in the tables of `compensate` and `next`, and too few poses, are named.
 
 use crate::common::program::{Folder, assert_contains};
 
@@ -132,4 +132,13 @@ fn usual_mistakes_in_arguments_get_a_tip() {
     ] {
         assert_contains(&folder.flexcal(command).code(2).message(), &[words]);
     }
+}
+
+#[test]
+fn a_loop_over_too_few_poses_asks_for_more() {
+    let problem = PROBLEM.replace("\"joint*.theta\"", "\"joint*.a\" = { sigma_mm = 1 }\n\"joint*.d\" = { sigma_mm = 1 }\n\"joint*.alpha\" = { sigma_deg = 0.1 }\n\"joint*.theta\"");
+    let folder = Folder::with([("problem.toml", problem.as_str()), ("TRUTH.toml", TRUTH)]);
+    folder.simulate(".", "TRUTH.toml", 8, 3, "measurements.csv");
+    let printed = folder.flexcal("loop . --out out").success().stdout;
+    assert_contains(&printed, &["Next: flexcal plan ", "--poses N"]);
 }

@@ -328,7 +328,12 @@ mod tests {
         let law = |effect: Effect| {
             stated(HypothesisKind::Effect(effect), Site::Joint(1), Covariate::Time)
         };
-        assert_eq!(law(problem.effects[0].effect.clone()), "joint 2 or the tool 0.48");
+        let Effect::Law(declared) = problem.effects[0].effect.clone() else {
+            unreachable!("the problem declares a law")
+        };
+        let composed = Effect::Law(declared.clone().composed(0.0, Vec::new()));
+        assert_eq!(law(composed), "joint 2 or the tool 0.48");
+        assert_eq!(law(Effect::Law(declared)), "joint 2 0.96");
         let harmonic = Effect::JointHarmonic { joint: 2, orders: vec![1] };
         assert_eq!(law(harmonic), "joint 2 0.96");
     }
