@@ -349,8 +349,8 @@ pub fn after_loop(
     to_identify(result, &named, &closed)
 }
 
-/// Names the command that identifies the problem as it is after a loop, or that ranks candidates for
-/// what is left. `closed` is the path of the problem that the loop wrote.
+/// Names the command that identifies the problem as it is after a loop, or that ranks candidates
+/// for what is left. `closed` is the path of the problem that the loop wrote.
 fn to_identify(result: &LoopResult, named: &str, closed: &str) -> String {
     match result.verdict {
         Verdict::Unexplained if result.is_probably_explained() => {

@@ -54,8 +54,8 @@ impl KnownNoise {
         Self { sigma, misfit, other_misfit }
     }
 
-    /// Returns the misfit of [`misfit_of`](Self::misfit_of) with what unknown directions of approach
-    /// change at the full parameter vector `x` of a model.
+    /// Returns the misfit of [`misfit_of`](Self::misfit_of) with what unknown directions of
+    /// approach change at the full parameter vector `x` of a model.
     pub fn misfit_with_sides(
         &self,
         (problem, model, x): (&Problem, &Model, &DVector<f64>),

@@ -44,8 +44,8 @@ impl<W: AsRef<str>> FromIterator<W> for Labels {
 }
 
 impl Columns {
-    /// Takes the first unread column with a different word in each row as the names of planned poses,
-    /// unless a column has them, and drops the warning that it is ignored.
+    /// Takes the first unread column with a different word in each row as the names of planned
+    /// poses, unless a column has them, and drops the warning that it is ignored.
     pub fn take_labels(&mut self, table: &Table, ignored: &mut Vec<Warning>) {
         let rows = table.beginning.rows();
         let is_label = |place: &usize| {

@@ -94,8 +94,8 @@ impl Past {
         self.approaches.extend(table.approach.iter().flat_map(|all| &all[of_joints.clone()]));
     }
 
-    /// Appends a stop between two rows of a table; the first is `None` at the start of a session. Its
-    /// direction of approach is that of the step to it, and the temperature is linear in time.
+    /// Appends a stop between two rows of a table; the first is `None` at the start of a session.
+    /// Its direction of approach is that of the step to it, and the temperature is linear in time.
     fn add_stop(
         &mut self,
         stop: &Stop,

@@ -72,8 +72,8 @@ pub(super) fn to_declare(
     declarations
 }
 
-/// Returns the advice to record directions of approach, if the law of an effect that depends on them is
-/// not sure and the rows lack them; `None` otherwise.
+/// Returns the advice to record directions of approach, if the law of an effect that depends on
+/// them is not sure and the rows lack them; `None` otherwise.
 fn missing_sides(closure: &ClosedLoop) -> Option<String> {
     let unsure = closure.effects.iter().filter(|found| found.status == Status::Located);
     let unsure = unsure.filter(|_| !closure.after.has_approach);

@@ -16,8 +16,8 @@ const CONTRADICTING: [FindingCode; 7] = [
     FindingCode::RowsChanged,
     FindingCode::SetUpUndecided,
 ];
-/// Largest ratio of the noise variance that a fit with a prior assumes to the declared one, at which
-/// they are equal but for rounding.
+/// Largest ratio of the noise variance that a fit with a prior assumes to the declared one, at
+/// which they are equal but for rounding.
 const MAX_EQUAL_VARIANCE_RATIO: f64 = 1.0 + 1e-9;
 
 /// What of a fit is to be trusted.
@@ -58,8 +58,8 @@ impl Trust {
     }
 }
 
-/// Returns the ratio of the noise variance that a fit with a prior assumes to the declared one, if it
-/// is larger.
+/// Returns the ratio of the noise variance that a fit with a prior assumes to the declared one, if
+/// it is larger.
 pub(crate) fn raised_variance(found: &Identification) -> Option<f64> {
     let prior = found.prior.as_ref().filter(|prior| prior.estimated_sigma.is_none())?;
     Some(prior.variance_ratio).filter(|ratio| *ratio > MAX_EQUAL_VARIANCE_RATIO)

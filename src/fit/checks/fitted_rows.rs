@@ -27,10 +27,10 @@ pub(super) fn no_outliers(fit: &CheckedFit) -> Option<Finding> {
 const READINGS: [FindingCode; 2] = [FindingCode::Misread, FindingCode::ColumnDoubted];
 
 impl Identification {
-    /// Takes over few rows that cause most of the misfit with a finding about them, and states these rows as its
-    /// cause in the errors about the misfit. An explanation by another reading of the whole table
-    /// is removed if it leaves more error than the fit without these rows. `leading` is the leading
-    /// kind of rows.
+    /// Takes over few rows that cause most of the misfit with a finding about them, and states
+    /// these rows as its cause in the errors about the misfit. An explanation by another reading of
+    /// the whole table is removed if it leaves more error than the fit without these rows.
+    /// `leading` is the leading kind of rows.
     pub(in crate::fit) fn state_influential_rows(
         &mut self,
         influential: InfluentialRows,

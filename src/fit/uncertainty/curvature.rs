@@ -1,8 +1,8 @@
 //! Standard errors that the curvature of the model refutes.
 //!
 //! Where some combination of the unknowns is uncertain by centimetres or degrees, the others follow
-//! it along a curve: with x = x̂ + Σ uₖ vₖ and normal uₖ, the optimum of the others moves by
-//! −½ Σ aₖₗ uₖ uₗ with aₖₗ = C Jᵀ r″(vₖ, vₗ) [Bates & Watts 1980]. The mean square of that, (½ Σ aₖₖ)²
+//! it along a curve: with x = x̂ + Σ uₖ vₖ and normal uₖ, the optimum of the others moves by −½ Σ
+//! aₖₗ uₖ uₗ with aₖₗ = C Jᵀ r″(vₖ, vₗ) [Bates & Watts 1980]. The mean square of that, (½ Σ aₖₖ)²
 //! plus ½ Σ aₖₗ², is compared with the squares of the standard errors.
 
 use nalgebra::{DMatrix, DVector};

@@ -1,16 +1,17 @@
-//! Uncertainty that limits hide: unknowns that follow bounds and constraints on which the fit rests.
+//! Uncertainty that limits hide: unknowns that follow bounds and constraints on which the fit
+//! rests.
 //!
-//! If the data hardly determine some combinations of unknowns, limits on them seem to determine these
-//! unknowns. They have small standard errors if the fit is held at the limits, but a limit only
-//! restricts it to one side. If the distances u of the limited sums from their limits grow, the other
-//! unknowns follow along the valley of the cost, x + S u, and the posterior of u is
+//! If the data hardly determine some combinations of unknowns, limits on them seem to determine
+//! these unknowns. They have small standard errors if the fit is held at the limits, but a limit
+//! only restricts it to one side. If the distances u of the limited sums from their limits grow,
+//! the other unknowns follow along the valley of the cost, x + S u, and the posterior of u is
 //!
 //! p(u) ∝ exp(−μᵀu − ½ uᵀ H u) on 0 ≤ u ≤ w
 //!
-//! with the multipliers μ of the limits, the curvature H of the cost along the valley, and the widths
-//! w after which the sums meet their opposite limits; x + S u keeps all bounds. S E(u uᵀ) Sᵀ is added
-//! to the covariance of the unknowns. The moments are those of a Markov chain that draws u along one
-//! line after another: along each distance and along each principal axis of H.
+//! with the multipliers μ of the limits, the curvature H of the cost along the valley, and the
+//! widths w after which the sums meet their opposite limits; x + S u keeps all bounds. S E(u uᵀ) Sᵀ
+//! is added to the covariance of the unknowns. The moments are those of a Markov chain that draws u
+//! along one line after another: along each distance and along each principal axis of H.
 
 use nalgebra::{DMatrix, DVector, Matrix, SymmetricEigen};
 use rand::RngExt as _;
@@ -24,8 +25,8 @@ use crate::least_squares::solver::AtBound;
 use crate::random;
 
 /// Smallest ratio of two deviations of an unknown at which limits hide its uncertainty. They are
-/// its deviation along the valley, and its standard error with the fit held at the limits. At 3, the
-/// valley has nine tenths of the variance.
+/// its deviation along the valley, and its standard error with the fit held at the limits. At 3,
+/// the valley has nine tenths of the variance.
 const MIN_HIDDEN_RATIO: f64 = 3.0;
 /// Smallest ratio of the motion of a hidden unknown by one limit to that by the limit that moves it
 /// most, at which it is a partner of the limit.
@@ -33,8 +34,8 @@ const MIN_PARTNER_RATIO: f64 = 0.5;
 /// Factor on the rows that hold combinations constant, so large that data and priors hardly change
 /// these combinations.
 const CONSTRAINT_WEIGHT: f64 = 1e5;
-/// Smallest coefficient of a limited sum, relative to its largest one, that is more than rounding if
-/// the sums before it are known.
+/// Smallest coefficient of a limited sum, relative to its largest one, that is more than rounding
+/// if the sums before it are known.
 const MIN_COEFFICIENT: f64 = 1e-9;
 /// Largest −ln of the density along a line, relative to its highest value, up to which it is drawn
 /// from; beyond it, the density is negligible.
@@ -117,8 +118,8 @@ fn limits_at(
 }
 
 /// Finds the limits of a stage that hide the uncertainty of unknowns, and the covariance that they
-/// hide, shape = (unknowns, unknowns). `triangle` is the factor R of the weighted data, and `errors`
-/// are the standard errors with the fit held at every limit on which it rests.
+/// hide, shape = (unknowns, unknowns). `triangle` is the factor R of the weighted data, and
+/// `errors` are the standard errors with the fit held at every limit on which it rests.
 pub(in crate::fit) fn hidden_by_limits(
     stage: &Stage,
     end: &FitEnd,
@@ -139,8 +140,8 @@ pub(in crate::fit) fn hidden_by_limits(
         let x = end.x[stage.unknowns[k]];
         let row = directions.row(k).transpose();
         let [lowest, highest] = [parameters[k].lower - x, parameters[k].upper - x];
-        // An unknown that rests on its bound is a distance itself; one whose error is larger than its
-        // range may follow in another way.
+        // An unknown that rests on its bound is a distance itself; one whose error is larger than
+        // its range may follow in another way.
         let is_wall = end.at_bound[k].is_none() && errors[k] < highest - lowest;
         (is_wall && row.amax() > 0.0).then_some((row, lowest, highest))
     };
@@ -193,8 +194,8 @@ struct Valley {
     kept: usize,
 }
 
-/// Returns the valley of the limits that are `released`, from which those are removed that the others
-/// decide; `None` without limits, or if the other unknowns are not determined.
+/// Returns the valley of the limits that are `released`, from which those are removed that the
+/// others decide; `None` without limits, or if the other unknowns are not determined.
 ///
 /// Each distance takes the place of an unknown of its sum. With the columns of the other unknowns
 /// first and those of the distances last, \[R Q; 0 P\] is the factor of data, priors and held
@@ -384,13 +385,14 @@ fn sampled(
     Ok(moments)
 }
 
-/// Returns the t at which s t + ½ c t² is [`MAX_EXPONENT`], with a slope s ≥ 0 and a curvature c ≥ 0.
+/// Returns the t at which s t + ½ c t² is [`MAX_EXPONENT`], with a slope s ≥ 0 and a curvature c ≥
+/// 0.
 fn reach(slope: f64, curvature: f64) -> f64 {
     2.0 * MAX_EXPONENT / (slope + (slope * slope + 2.0 * curvature * MAX_EXPONENT).sqrt())
 }
 
-/// Returns the number t in a range around 0 at which the distribution with the density ∝ exp(−s t − ½ c
-/// t²) has the value `share`, 0 to 1. Returns `None` if neither density nor range restricts t.
+/// Returns the number t in a range around 0 at which the distribution with the density ∝ exp(−s t −
+/// ½ c t²) has the value `share`, 0 to 1. Returns `None` if neither density nor range restricts t.
 fn drawn((slope, curvature): (f64, f64), (low, high): (f64, f64), share: f64) -> Option<f64> {
     let curvature = curvature.max(0.0);
     let peak = match slope {
@@ -450,7 +452,8 @@ mod tests {
 
     #[test]
     fn bounds_that_meet_in_a_corner_are_left_along_the_weak_direction() {
-        // The data determine the sum of the distances' difference alone: u moves along its diagonal.
+        // The data determine the sum of the distances' difference alone: u moves along its
+        // diagonal.
         let (found, _) = of(&[1.0, 1.0], &[1e6, -1e6, -1e6, 1e6], &[1.0, 1.0]);
         // Along the diagonal the density is exp(−2 t) on 0 to 1.
         let expected = {

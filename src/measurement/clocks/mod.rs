@@ -57,8 +57,8 @@ const MIN_CLEAR_RATIO: f64 = 2.0;
 const MIN_CLEAR_ROWS: usize = 10;
 
 impl ClockShift {
-    /// Returns true if so many rows measured at `times` \[s\] are so near their partners in `log`, a
-    /// table of the `stops`, that the shift may be taken without being declared.
+    /// Returns true if so many rows measured at `times` \[s\] are so near their partners in `log`,
+    /// a table of the `stops`, that the shift may be taken without being declared.
     pub fn is_clear(self, times: &[f64], (log, stops): (&[f64], &Stops)) -> bool {
         if self.is_of_stops {
             return true;

@@ -27,8 +27,8 @@ struct Passed<'a> {
 }
 
 impl JoinedLog {
-    /// Reads the configuration of each row of the joint table with `read`, behind the current row of a
-    /// table of measured rows.
+    /// Reads the configuration of each row of the joint table with `read`, behind the current row
+    /// of a table of measured rows.
     pub fn read_configurations(&mut self, table: &mut Table, read: impl Fn(&Table) -> Vec<f64>) {
         for row in self.rows.iter_mut().filter(|row| row.configuration.is_empty()) {
             table.append_row(&row.source);
@@ -98,8 +98,8 @@ struct Motion {
 struct Motions(Vec<Motion>);
 
 impl Motions {
-    /// Moves to the next pose, the one at `place` since the last measured one, and calls `turn` with
-    /// the place of each unmeasured pose at which a joint turned or began to move.
+    /// Moves to the next pose, the one at `place` since the last measured one, and calls `turn`
+    /// with the place of each unmeasured pose at which a joint turned or began to move.
     fn advance(
         &mut self,
         configuration: &[f64],
