@@ -368,7 +368,7 @@ impl ClosedLoop {
 
     /// What the command line prints.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
-        detached(py, || report::loop_text(&self.problem, &self.closure))
+        detached(py, || report::loop_text(&self.problem, &self.closure, None))
     }
 
     /// Pages and figures.

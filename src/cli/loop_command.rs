@@ -104,10 +104,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn(&report::interrupted(closure.rounds.len()));
     }
     common.print_result(&json, || {
+        let accuracy = PredictionAccuracy::new(&closure.after, &shown);
         let told = if arguments.verbose {
-            report::loop_text(&problem, &closure)
+            report::loop_text(&problem, &closure, accuracy)
         } else {
-            let accuracy = PredictionAccuracy::new(&closure.after, &shown);
             report::loop_brief(&problem, &closure, accuracy)
         };
         let poses = data.measurements.arm_pose_numbers(&problem);

@@ -68,10 +68,14 @@ fn influential_views(
             let sum: f64 = distances.map(|outlier| outlier.distance.powi(2)).sum();
             sum / views[*view].len() as f64
         };
-        let left = (0..views.len()).filter(|view| !removed.contains(view) && square(view) > 0.0);
+        // Where single points stand out, it is not the view that is wrong.
+        let stands_out = |view: &usize| {
+            let count = views[*view].iter().filter(|row| outliers.contains_key(row)).count();
+            2 * count > views[*view].len()
+        };
+        let left = (0..views.len()).filter(|view| !removed.contains(view) && stands_out(view));
         let Some(worst) = left.max_by(|a, b| square(a).total_cmp(&square(b))) else { break };
-        let of_view = views[worst].iter().filter_map(|row| outliers.get(row).copied().cloned());
-        rows.extend(of_view);
+        rows.extend(views[worst].iter().filter_map(|row| outliers.get(row).copied().cloned()));
         removed.push(worst);
         let numbers: Vec<usize> = removed.iter().flat_map(|&view| &views[view]).copied().collect();
         let next = without(&numbers).filter(|fit| fit.termination.converged())?;

@@ -108,8 +108,8 @@ fn head<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
     let is_massless = |joint: &Joint| joint.bodies.is_empty() && joint.beam.is_none();
     if problem.gravity.norm() > 0.0 && problem.joints.iter().all(is_massless) {
         blocks.push(Block::lines(
-            "No masses are declared, so what gives way under loads cannot be found; rough mass_kg and com_m of \
-             the links will do.",
+            "No masses are declared, so what gives way under the weight of links cannot be found; rough \
+             mass_kg and com_m of the links will do.",
         ));
     }
     blocks

@@ -185,11 +185,17 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
 }
 
 /// Returns the full outcome as text, ending in a line break.
-pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
+pub fn loop_text(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    accuracy: Option<PredictionAccuracy>,
+) -> String {
     let result = &LoopResult::new(problem, closure);
-    let mut blocks = head(problem, closure, result, None);
-    blocks
-        .extend([Block::Table(errors(closure, result, None)), gain_block(closure, result, false)]);
+    let mut blocks = head(problem, closure, result, accuracy.as_ref());
+    let corrected = accuracy.as_ref().and_then(|accuracy| accuracy.corrected);
+    blocks.push(Block::Table(errors(closure, result, corrected.as_ref())));
+    blocks.push(gain_block(closure, result, corrected.is_some()));
+    blocks.extend(accuracy.and_then(|accuracy| accuracy.bound).map(Block::lines));
     let failed = residual_tests::failed(&closure.before.residual_tests);
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));

@@ -168,9 +168,10 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
             let rows = influential.counted(row_noun(found));
             format!("mostly because of {rows} {cause}")
         }
-        None if rests_on_limits(found) => "so the declared σ is too small, a limit at which the \
-                                           fit rests is wrong, or the model lacks something"
-            .to_owned(),
+        None if rests_on_limits(found) => {
+            "so the declared σ is too small, a limit is wrong, or the model lacks something"
+                .to_owned()
+        }
         None => "so the declared σ is too small or the model lacks something".to_owned(),
     };
     format!(
@@ -423,7 +424,7 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
             } else {
                 "Converged, but single parameters are not to be trusted"
             };
-            format!("{what}: {larger}")
+            format!("{what}: {larger}, and parameters may have absorbed what the model lacks")
         }
         _ => unjudged.unwrap_or_else(|| match reserved.as_str() {
             _ if !is_free => "No parameter is free, so that the nominal arm is judged".to_owned(),
@@ -446,7 +447,7 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
 }
 
 /// States how much the residual, that without the remainder if `is_corrected`, exceeds the declared
-/// σ, and what follows for the parameters; `None` if it does not exceed it.
+/// σ; `None` if it does not exceed it.
 fn larger_residual(found: &Identification, is_corrected: bool) -> Option<String> {
     let of = if is_corrected { " without the remainder" } else { "" };
     let times = |ratio: f64| format!("{} × the declared σ", number(ratio, 1));
@@ -457,10 +458,5 @@ fn larger_residual(found: &Identification, is_corrected: bool) -> Option<String>
     } else {
         format!("the residual{of} is larger than the declared σ explains")
     };
-    let what = if found.unknowns.is_empty() {
-        ""
-    } else {
-        ", and parameters may have absorbed what the model lacks"
-    };
-    Some(size + what)
+    Some(size)
 }

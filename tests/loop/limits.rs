@@ -27,7 +27,7 @@ fn a_link_longer_than_its_tolerance_is_no_effect() {
     assert!(claims.law.1 > 0.5, "{claims:?}");
     let result = LoopResult::new(&problem, &closed);
     assert_eq!(result.unexplained.unwrap().limit.as_deref(), Some("of joint4.a"));
-    let said = loop_text(&problem, &closed).replace('\n', " ");
+    let said = loop_text(&problem, &closed, None).replace('\n', " ");
     assert!(said.contains("limit of joint4.a"), "{said}");
     // No law was tried in its place.
     assert!(!said.contains("No effect of the catalogue"), "{said}");

@@ -48,7 +48,7 @@ fn rows_that_nothing_explains_are_not_called_noise() {
     let closure = close(&problem, &data, &Options::default()).unwrap();
     assert_eq!(closure.set_aside, [data.measurements.location(row)]);
     assert_eq!((closure.effects.len(), closure.verdict), (0, Verdict::Unexplained));
-    let text = flexcal::report::loop_text(&problem, &closure).replace('\n', " ");
+    let text = flexcal::report::loop_text(&problem, &closure, None).replace('\n', " ");
     assert!(text.contains("1 pose stands out"), "{text}");
     assert!(LoopResult::new(&problem, &closure).unexplained.is_none());
 }

@@ -32,7 +32,7 @@ fn stopped_in_its_first_round_it_names_no_cause_and_rules_none_out() {
             && closed.rounds.is_empty()
             && closed.effects.is_empty()
     );
-    for said in [loop_text(&problem, &closed), loop_brief(&problem, &closed, None)] {
+    for said in [loop_text(&problem, &closed, None), loop_brief(&problem, &closed, None)] {
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(said.contains("Search interrupted before the first round was done"), "{said}");
         assert!(

@@ -117,7 +117,8 @@ fn every_format_states_the_same_verdict_statuses_and_findings() {
         let plots = PlotData::of_loop(&problem, &data, &closure).unwrap();
         let report = loop_report(&problem, &closure, &plots);
         let json: Value = serde_json::from_str(&result.to_json()).unwrap();
-        let (text, brief) = (loop_text(&problem, &closure), loop_brief(&problem, &closure, None));
+        let (text, brief) =
+            (loop_text(&problem, &closure, None), loop_brief(&problem, &closure, None));
         let formats = [
             ("text", plain(&text)),
             ("screen", plain(&brief)),

@@ -25,7 +25,7 @@ const MIN_GROSS_DISTANCE: f64 = 10.0;
 /// Probability that a row has a gross error.
 const PROBABILITY_OF_GROSS_ERROR: f64 = 0.01;
 /// Smallest probability of so many gross errors at which they are left out of the test.
-const MIN_CHANCE_OF_ERRORS: f64 = 0.1;
+const MIN_CHANCE_OF_ERRORS: f64 = 0.01;
 /// Maximum number of held-out rows that are tested together, which limits the computing time.
 const MAX_TESTED_ROWS: usize = 2048;
 /// Smallest ratio of the mean increase of squared held-out errors to its standard error at which

@@ -52,8 +52,9 @@ const MIN_DISTANCE: f64 = 3.0;
 /// Difference of an angle \[rad\] from which two solutions are two descriptions of one arm: whole
 /// turns, and half turns of neighbouring axes.
 const MAX_ANGLE: f64 = 3.0;
-/// Smallest probability of a second solution that is reported, with both equally probable before
-/// the measurements: that of a χ² larger by 13.8.
+/// Largest share of χ² by which another solution counts as better if σ is estimated.
+const LARGEST_SHARE: f64 = 1.0 - 1e-9;
+/// Smallest probability of a second solution that is reported.
 const MIN_PROBABILITY: f64 = 1e-3;
 /// Logarithm of the odds (19 to 1) from which one of two solutions is decided.
 const LN_DECISIVE_ODDS: f64 = 2.944_438_979_166_44;
@@ -164,14 +165,13 @@ fn rival(
     noise_model: NoiseModel,
     others: Vec<DVector<f64>>,
 ) -> Option<SecondSolution> {
-    let least = -(MIN_PROBABILITY.recip() - 1.0).ln();
     let solutions = others
         .into_iter()
         .filter_map(|x| {
             let most = distance(whole, &best.1, &best.0.x, &x)?.unknown;
             Some(SecondSolution { most, ..compared(whole, best, noise_model, x) })
         })
-        .filter(|solution| -0.5 * solution.excess > least);
+        .filter(|solution| solution.probability() > MIN_PROBABILITY);
     solutions.max_by(|a, b| a.ln_odds().total_cmp(&b.ln_odds()))
 }
 
@@ -186,7 +186,11 @@ fn compared(
     let is_estimated = *noise != Noise::Declared || noise_model != NoiseModel::DECLARED;
     let freedom = whole.count().saturating_sub(whole.unknowns.len()).max(1) as f64;
     let excess = 2.0 * (whole.cost(&x) - whole.cost(&end.x));
-    let excess = if is_estimated { freedom * (excess / freedom).ln_1p() } else { excess };
+    let excess = if is_estimated {
+        freedom * (excess / freedom).max(-LARGEST_SHARE).ln_1p()
+    } else {
+        excess
+    };
     let [near, other] = [&end.x, &x].map(|x| largest_departure(whole, statistics, x));
     let ln_farther = if near > 0.0 { (other / near).ln() } else { 0.0 };
     SecondSolution { x, most: 0, excess, ln_farther }

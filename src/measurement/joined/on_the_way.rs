@@ -59,7 +59,18 @@ impl JoinedLog {
             let time = if is_timed { row.time } else { f64::NAN };
             Some(Passed { configuration: &row.configuration, time, rows })
         };
-        let stops = rows.add_passed(order.iter().filter_map(pose), problem)?;
+        let poses: Vec<Passed> = order.iter().filter_map(pose).collect();
+        let measured = poses.iter().filter_map(|pose| pose.rows.first().copied());
+        let is_measured_in_order = if rows.time_measured {
+            measured.map(|row| time.get(row)).is_sorted()
+        } else {
+            measured.is_sorted()
+        };
+        // The order of a list of planned poses is not that of the motions.
+        if !is_measured_in_order {
+            return None;
+        }
+        let stops = rows.add_passed(poses.into_iter(), problem)?;
         let file = &self.rows.first()?.source.file;
         let kind = WarningKind::ApproachesTaken { stops };
         Some(Warning { location: Location::file(file), kind })

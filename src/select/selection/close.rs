@@ -229,11 +229,6 @@ pub fn close_by(
             && excluded.is_none()
     });
     let found_alone = replaceable.map(|sure| FoundAlone::new(sure, &data, gain_of(sure)));
-    let with_found = match with_found {
-        _ if excluded.is_some() => declared.found.fitted,
-        Some(sure) => sure.found.fitted,
-        None => fitted.found.fitted,
-    };
     let has_gear = state.added(&fitted).iter().any(is_periodic_of_many_orders);
     let misread =
         state.misread.as_ref().filter(|misread| state.added(&fitted).contains(&misread.effect));
@@ -248,6 +243,12 @@ pub fn close_by(
     let gravity = is_open.then(|| other_gravity(&state, &declared, &fitted)).flatten();
     let verdict = if gravity.is_some() { Verdict::Unexplained } else { verdict };
     lower_contradicted(&mut effects, &fitted.found, (gain, gravity.is_some()));
+    let is_sure = effects.iter().any(|found| found.status == Status::Found);
+    let with_found = match with_found {
+        _ if excluded.is_some() || !is_sure && !effects.is_empty() => declared.found.fitted,
+        Some(sure) => sure.found.fitted,
+        None => fitted.found.fitted,
+    };
     let mut after = fitted.found;
     after.findings.splice(0..0, orientations.into_iter().chain(gravity).chain(excluded));
     if !interrupted {
@@ -269,7 +270,7 @@ pub fn close_by(
         gain,
         set_aside,
         rules: rules.clone(),
-        found_alone,
+        found_alone: found_alone.filter(|_| is_sure),
     })
 }
 

@@ -43,7 +43,8 @@ pub(super) fn searched_with_all_rows(
     }
     let all_rows = declared.with_outliers(Vec::new());
     let mut other = SearchState::new(state.data, state.options, &all_rows);
-    let second = search(&mut other, all_rows)?;
+    // Rows that spoil the fit may end this search; the first one stands then.
+    let Ok(second) = search(&mut other, all_rows) else { return Ok(first) };
     // The evidence about effects that it does not remove from the fit is not known.
     let (added, judged) = (other.added(&second.0), other.reconsidered(&second.0));
     if added.is_empty() || added != judged || second.0.set_aside.len() >= aside {
