@@ -49,7 +49,8 @@ impl Stop {
 /// Chronological order of the rows: session by session, and by time within a session.
 #[derive(Debug, Clone)]
 struct Chronology {
-    /// For each row, the position in the order of the first row of its session, and of itself.
+    /// For each row, the position in the order of the first row or stop of its session, and of
+    /// itself.
     places: Vec<(u32, u32)>,
     /// Columns in chronological order, with the stops between rows; `None` if the table already has
     /// that order and no stops.
@@ -65,6 +66,7 @@ impl Chronology {
         });
         let mut places = vec![(0, 0); rows.len()];
         let (mut begin, mut at) = (0, 0);
+        let is_in_order = rows.is_sorted() && table.stops.is_empty();
         let mut past = Past::default();
         for (&row, &before) in rows.iter().zip(rows.first().into_iter().chain(&rows)) {
             let is_first = row == before || session(row) != session(before);
@@ -76,10 +78,11 @@ impl Chronology {
                 at += 1;
             }
             places[row] = (begin, at);
-            past.add_row(table, row);
+            if !is_in_order {
+                past.add_row(table, row);
+            }
             at += 1;
         }
-        let is_in_order = rows.is_sorted() && table.stops.is_empty();
         Self { places, sorted: (!is_in_order).then_some(past) }
     }
 }

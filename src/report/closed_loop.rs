@@ -153,13 +153,9 @@ fn cautions_on_causes<'a>(
     result: &LoopResult,
 ) -> Vec<Block<'a>> {
     let declare = to_declare(problem, closure, result).into_iter().map(Block::Note);
-    let mut blocks: Vec<Block> = declare.collect();
-    blocks.extend(
-        result.is_misfit_of_rows().then(|| influential_rows(&closure.before.fit)).flatten(),
-    );
-    blocks.extend(cautions(closure, result));
-    blocks.extend(set_aside(problem, result));
-    blocks
+    let blamed = result.is_misfit_of_rows().then(|| influential_rows(&closure.before.fit));
+    let of_rows = blamed.flatten().into_iter().chain(cautions(closure, result));
+    declare.chain(of_rows).chain(set_aside(problem, result)).collect()
 }
 
 /// Names the rows that were excluded from the choice of effects; `None` if there are none.

@@ -432,7 +432,7 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
             _ => CONVERGED.to_owned(),
         }),
     };
-    // The change of the error is the ground of trust in all, but of no reservation.
+    // A colon after "Trusted" makes the change of the error its reason; reservations have others.
     let (the, left) = match larger {
         Some(_) if is_free && trust == Trust::Predictions => (". The", String::new()),
         larger => (

@@ -35,8 +35,10 @@ pub(super) fn to_declare(
     let mut declarations = Vec::new();
     if lacks_masses(result) {
         declarations.push(format!(
-            "Declare the masses: gravity acts, and the problem declares none. Give each link {} and {} in {}, and each compliant \
-             joint or link its stiffness or {}. Rough guesses of unknown masses will do, because fitted compliances make up for them.",
+            "Declare the masses: gravity acts, and the problem declares none. Give each link {} and \
+             {} in {}, and each compliant joint or link its stiffness or {}. Rough guesses of unknown \
+             masses will do for predictions, because fitted compliances make up for them; which part \
+             gives way is then less sure than stated.",
             code("mass_kg"),
             code("com_m"),
             code("[[joint.body]]"),

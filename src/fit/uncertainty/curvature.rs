@@ -77,7 +77,7 @@ fn combinations(covariance: &DMatrix<f64>, sizes: &[Option<f64>]) -> Combination
     let n = sizes.len();
     let size = |j: usize| sizes[j].unwrap_or(f64::INFINITY);
     let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (size(i) * size(j)));
-    if scaled.trace() < MIN_DEVIATION.powi(2) {
+    if scaled.trace() < MIN_DEVIATION.powi(2) || scaled.iter().any(|value| !value.is_finite()) {
         return Vec::new();
     }
     let eigen = scaled.symmetric_eigen();

@@ -29,8 +29,9 @@ pub(in crate::fit) struct Statistics {
     /// Standard error of each unknown: of its deviation in SI units, or of the logarithm of a
     /// stiffness or rigidity.
     pub errors: Vec<f64>,
-    /// For each unknown, true if data and priors determine it: it rests on no bound and has no part
-    /// in an unidentifiable combination.
+    /// For each unknown, true if data and priors determine it: it rests on no bound, has no part in
+    /// an unidentifiable combination, does not follow one, and its standard error is not refuted by
+    /// the curvature of the model.
     pub determined: Vec<bool>,
     /// Identified share of each unknown, 0…1; 1 for unknowns without a prior in a provisional fit.
     pub identified: Vec<f64>,
