@@ -353,6 +353,16 @@ impl Identification {
     }
 }
 
+impl ClosedLoop {
+    /// What its pages and its summary show.
+    fn shown(&self) -> Result<PlotData, IdentifyError> {
+        let shown = PlotData::of_loop(&self.problem, &self.data, &self.closure)?;
+        let Some(fitted) = &self.fitted else { return Ok(shown) };
+        let found = (&self.closure.after, &self.closure.closed);
+        shown.with_uncertainty(found, &self.data, fitted)
+    }
+}
+
 #[pymethods]
 impl ClosedLoop {
     /// loop.json.
@@ -368,18 +378,18 @@ impl ClosedLoop {
 
     /// What the command line prints.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
-        detached(py, || report::loop_text(&self.problem, &self.closure, None))
+        detached(py, || {
+            let shown = self.shown()?;
+            let accuracy = PredictionAccuracy::new(&self.closure.after, &shown);
+            Ok(report::loop_text(&self.problem, &self.closure, accuracy))
+        })?
+        .map_err(|error: IdentifyError| raised(&error))
     }
 
     /// Pages and figures.
     fn report(&self, py: Python<'_>) -> PyResult<Pages> {
         detached(py, || {
-            let mut shown = PlotData::of_loop(&self.problem, &self.data, &self.closure)?;
-            if let Some(fitted) = &self.fitted {
-                let found = (&self.closure.after, &self.closure.closed);
-                shown = shown.with_uncertainty(found, &self.data, fitted)?;
-            }
-            Ok(pages(report::loop_report(&self.problem, &self.closure, &shown)))
+            Ok(pages(report::loop_report(&self.problem, &self.closure, &self.shown()?)))
         })?
         .map_err(|error: IdentifyError| raised(&error))
     }
