@@ -21,6 +21,7 @@ use flexcal::urdf::{
     mounted_target, yaml,
 };
 
+use super::camera_advice::measures_no_position;
 use super::estimate::Trust;
 use super::flags::{Flags, file_in};
 use super::outcome::Outcome;
@@ -351,8 +352,10 @@ fn check_tool(problem: &Problem, model: &Model) -> Result<(), code::ExportError>
     let camera = problem.fixtures.iter().find(|fixture| fixture.kind.word() == "camera");
     match camera {
         _ if is_turned => Ok(()),
-        Some(camera) => Err(code::ExportError::CameraIsWritten { camera: camera.name.clone() }),
-        None => Err(code::ExportError::ToolNotTurned),
+        Some(camera) if measures_no_position(problem) => {
+            Err(code::ExportError::CameraIsWritten { camera: camera.name.clone() })
+        }
+        _ => Err(code::ExportError::ToolNotTurned),
     }
 }
 

@@ -24,7 +24,6 @@ const ROWS_PER_REMOVAL: usize = 100;
 /// Ratio of the residual variance after a round to that before, above which the removed rows are
 /// not gross errors and the search ends.
 const MAX_GAINFUL_RATIO: f64 = 0.95;
-
 /// Most influential rows that are not sought as whole views.
 const MAX_SINGLE_ROWS: usize = 4;
 

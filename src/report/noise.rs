@@ -397,9 +397,32 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     } else {
         format!(", but {}", reservations.join("; "))
     };
+    let is_free = !found.unknowns.is_empty();
+    let trust = Trust::of(found, accuracy.is_some_and(|of| of.contradicted.is_some()));
+    // Where predictions alone are trusted, the verdict states the residual, other ones after it.
+    let (alone, beside) = match larger {
+        Some(larger) if is_free && trust == Trust::Predictions => (Some(larger), None),
+        larger => (None, larger),
+    };
+    let judged = match &alone {
+        Some(larger) => {
+            let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
+            let what = if has_bound {
+                "Predictions are trusted within the error bound below, single parameters are not"
+            } else {
+                "Converged, but single parameters are not to be trusted"
+            };
+            format!("{what}: {larger}, and parameters may have absorbed what the model lacks")
+        }
+        None => unjudged.unwrap_or_else(|| match reserved.as_str() {
+            _ if !is_free => "No parameter is free, so that the nominal arm is judged".to_owned(),
+            "" => "Trusted".to_owned(),
+            _ => CONVERGED.to_owned(),
+        }),
+    };
+    let left = beside.map_or_else(String::new, |words| format!(" Not fully explained: {words}."));
     if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
-        let judged = if reserved.is_empty() { "The fit is to be trusted" } else { CONVERGED };
-        return format!("{}{reserved}.", unjudged.unwrap_or_else(|| judged.to_owned()));
+        return format!("{judged}{reserved}.{left}");
     }
     let without = if corrected.is_some() {
         format!(" ({} without the remainder)", with_unit(fitted, fitted.mean.norm))
@@ -414,32 +437,8 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     } else {
         format!("rises from {from} to {to}")
     };
-    let is_free = !found.unknowns.is_empty();
-    let trust = Trust::of(found, accuracy.is_some_and(|of| of.contradicted.is_some()));
-    let judged = match &larger {
-        Some(larger) if is_free && trust == Trust::Predictions => {
-            let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
-            let what = if has_bound {
-                "Predictions are trusted within the error bound below, single parameters are not"
-            } else {
-                "Converged, but single parameters are not to be trusted"
-            };
-            format!("{what}: {larger}, and parameters may have absorbed what the model lacks")
-        }
-        _ => unjudged.unwrap_or_else(|| match reserved.as_str() {
-            _ if !is_free => "No parameter is free, so that the nominal arm is judged".to_owned(),
-            "" => "Trusted".to_owned(),
-            _ => CONVERGED.to_owned(),
-        }),
-    };
     // A colon after "Trusted" makes the change of the error its reason; reservations have others.
-    let (the, left) = match larger {
-        Some(_) if is_free && trust == Trust::Predictions => (". The", String::new()),
-        larger => (
-            if reserved.is_empty() { ": the" } else { ". The" },
-            larger.map_or_else(String::new, |words| format!(" Not fully explained: {words}.")),
-        ),
-    };
+    let the = if alone.is_none() && reserved.is_empty() { ": the" } else { ". The" };
     format!(
         "{judged}{reserved}{the} mean {} error {change}{without}.{left}",
         test_rows_word(&found.fitted).replace(' ', "-")

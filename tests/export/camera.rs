@@ -201,8 +201,7 @@ fn the_mount_of_a_camera_needs_no_option() {
     folder.write("arm.urdf", ARM);
     let export = "export . --estimate fit/estimate.json --urdf arm.urdf --out new.urdf";
     let run = folder.flexcal(&format!("{export} --tool-link camera_optical_frame")).code(2);
-    let said = run.message();
-    assert!(said.contains("leave --tool-link out") || said.contains("chain"), "{said}");
+    assert_contains(&run.message(), &["leave --tool-link out"]);
 }
 
 #[test]

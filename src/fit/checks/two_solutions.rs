@@ -45,11 +45,12 @@ fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Finding {
     };
     let text = format!(
         "a second arm{place} explains the measurements too, with a probability of {:.1} %: {name} is {} instead of {} (χ² \
-         with priors is {} larger)",
+         with priors is {} {})",
         probability * 100.0,
         shown(parameter, other, error),
         shown(parameter, estimate, error),
-        about_three_digits(second.excess.max(0.0)),
+        about_three_digits(second.excess.abs()),
+        if second.excess < 0.0 { "smaller" } else { "larger" },
     );
     let is_position = fit.table().leading().is_position();
     let told = if is_position { most_different(fit, &second.x) } else { None };
